@@ -18,7 +18,7 @@ from ncfix.control.coordinates import LETTERS, mask_of, rotated
 from ncfix.control.expressions import number
 from ncfix.control.moves import CycleCall, MotionEnd, MotionKind, Pass, Passing
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
-from ncfix_siemens.sinumerik.milling import MILLING, PLANES, milling_of, said_in
+from ncfix_siemens.sinumerik.milling import MILLING, OTHER_PLANE, PLANES, milling_of, said_in
 from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import (
@@ -92,7 +92,7 @@ def points_of(control: Sinumerik, step: Calling) -> Points:
     if places is circle and others[0] == SAYS_IT_AGAIN[bool(values[4])]:
         others[0] = None
     *hiding, mode = others
-    chosen = round(mode) % 10 if isinstance(mode, float) else 0
+    chosen = digit_of((mode,), 0)
     if any(hiding) or (chosen and PLANES.get(chosen) != modal.plane.across):
         return ()
     if places is not listed and not 1 <= (values[ARGUMENTS - 1] or 0.0) <= MOST:
@@ -141,6 +141,12 @@ AFTER_CYCLE = "where the axis {} stands after a cycle is not followed"
 CENTRING, GEOMETRY_MODE = "cycle81", 6
 """The cycle that can go down to a diameter, and which argument says so."""
 
+PLANE_AT = {"cycle81": 7, "cycle82": 7, "cycle83": 18, "cycle85": 9, "cycle86": 12}
+"""Which argument of a drilling cycle is DMODE, whose last digit may choose a plane for it."""
+AXIS_AT = {"cycle83": 12, "cycle84": 12, "cycle840": 11}
+"""Which is AXN: 1 and 2 make it drill along an axis of the plane."""
+OTHER_AXIS = "{} drills along an axis of the plane in force (AXN)"
+
 ALIKE = 1e-6
 """Program units; two depths that differ by less are one."""
 
@@ -163,11 +169,22 @@ def drilling_of(control: Sinumerik, step: Calling) -> Drilling:
     if step.name == CENTRING and mode:
         fault = BY_DIAMETER.format(name)
     said, sure = said_in(control, step)
+    chosen, axis = (digit_of(said, places.get(step.name)) for places in (PLANE_AT, AXIS_AT))
+    if chosen and PLANES.get(chosen) != control.modal.plane.across:
+        fault = OTHER_PLANE.format(name)
+    elif axis in (1, 2):
+        fault = OTHER_AXIS.format(name)
     first, first_way = FIRST_DEPTH if step.name == DEEP else (DP, DPR)
     heights = [(place, 1) for place in sorted({DP, first}) if said[place:] and said[place] is not None]
     ways = [(place, -1) for place in sorted({DPR, first_way}) if said[place:] and said[place] not in (None, 0.0)]
     depths = tuple(sorted(heights + ways))
     return Drilling(step.name, clear, depth, fault, said, sure, control.external, depths)
+
+
+def digit_of(said: Sequence[float | str | None], place: int | None) -> int:
+    """The last digit of an argument; zero where it is not given."""
+    value = said[place] if place is not None and place < len(said) else None
+    return round(abs(value)) % 10 if isinstance(value, float) else 0
 
 
 def call_of(control: Sinumerik, drilling: Drilling, block: int, *, modal: bool) -> CycleCall:

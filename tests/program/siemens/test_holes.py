@@ -75,6 +75,10 @@ def test_an_argument_that_nobody_knows_stays_and_so_does_the_depth() -> None:
         ("MCALL CYCLE81(50,0,2,R9)\nX5\nMCALL", "known only at run time"),
         ("CYCLE81(50,0,2,-20,21)", "given twice"),
         ("CYCLE81(50,0,2,8,,0,1)", "a diameter"),
+        ("CYCLE82(50,0,2,-8,,0,0,12,10)", "another plane"),
+        ("MCALL CYCLE83(50,0,2,-8,,-3,,2,0,0,1,0,,1,1,0,0,0,3,0)\nX5\nMCALL", "another plane"),
+        ("CYCLE83(50,0,2,-8,,-3,,2,0,0,1,0,2)", "an axis of the plane"),
+        ("CYCLE840(50,0,2,-8,,0.5,4,3,1,8,,1)", "an axis of the plane"),
         ("X5 CYCLE81(50,0,2,-20)", "in one block"),
         (f"{MODAL}\nPLACES\nMCALL\nMCALL CYCLE82(50,0,2,-5)\nPLACES\nMCALL\nM30\n%_N_PLACES_SPF\nX5\nM17", "several"),
         (f"{MODAL}\nPLACES\nMCALL\nM30\n%_N_PLACES_SPF\nX5 M17", "the subprogram ends"),
@@ -83,6 +87,20 @@ def test_an_argument_that_nobody_knows_stays_and_so_does_the_depth() -> None:
 def test_what_is_refused(body: str, why: str) -> None:
     reasons = [each.reason for each in fixed(body).report.refused]
     assert any(why in reason for reason in reasons), reasons
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "CYCLE81(50,0,2,{},,0,0,11,12)",
+        "CYCLE83(50,0,2,{},,-3,,2,0,0,1,0,3,1,1,0,0,0,1,0)",
+        "CYCLE83(50,0,2,{},,-3,,0,,0,1,0,,3,1,0,0,0,0,1001110)",
+        "CYCLE84(50,0,2,{},,,3,,1.25,0,200,200,0,0,0,1,2,1)",
+        "CYCLE86(50,0,2,{},,0,3,0,0,0,0,0,0,10)",
+    ],
+)
+def test_calls_with_all_arguments_that_stay_in_the_plane(call: str) -> None:
+    assert "-19.991" in written(call.format(-20))
 
 
 @pytest.mark.parametrize(
