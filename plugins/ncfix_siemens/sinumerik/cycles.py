@@ -124,6 +124,9 @@ def lead_to(
     return BlockWordValues(block, axes=axes), end, WRITE_OUT.format(name)
 
 
+POCKETS = frozenset({"cycle63", "cycle64"})
+"""Cycles that use up the contours that CYCLE62 has named."""
+
 MADE = "motions that the control makes up ({})"
 MADE_HOLES = "holes whose places the control makes up ({})"
 HEIGHTS = "the heights of the cycle {} are known only at run time"
@@ -212,6 +215,7 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
         if MEASURING.fullmatch(step.name):
             measure(control, block, step)
             return
+        control.milled |= step.name in POCKETS
         holes = step.name.startswith(("holes", "cycle80"))
         made(control, block, refusal=(MADE_HOLES if holes else MADE).format(name))
         return

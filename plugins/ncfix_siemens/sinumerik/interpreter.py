@@ -310,7 +310,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         control, modal, called = self.control, self.control.modal, step.name.upper()
         drilling, name = milling_of(control, step, modal=False), contour_named(control, step)
         fault, found = drilling.fault, self.flow.stretch(name, self.find)
-        if words.axes or modal.incremental or modal.compensated:
+        if words.axes or modal.incremental or modal.compensated or control.modes.modal_cycle is not None:
             fault = fault or NOT_ALONE
         if found is None:
             made(control, block, refusal=(fault or NO_CONTOUR).format(called))

@@ -215,7 +215,7 @@ NO_CONTOUR = "the contour of {} is not found: it has to be a subprogram, or to s
 NOT_REWRITTEN = "{} or its contour is in the file of a subprogram, which is not rewritten"
 OTHER_BLOCK = "the contour of {} has a block that is more than a line or an arc in the plane in force"
 NO_START = "the contour of {} does not begin with G0 or G1 to a place of which both words are known numbers"
-NOT_ALONE = "{} has to be called in a block by itself, in G90 and G40"
+NOT_ALONE = "{} has to be called in a block by itself, in G90 and G40, and not under MCALL"
 ALONG = "{} is corrected at each point of its contour, at its bottom; its depth is corrected where the contour begins"
 
 

@@ -151,6 +151,10 @@ def test_a_contour_is_corrected_at_its_points_and_its_cycle_in_depth(calls: str,
         (CONTOUR.format("FIRST:LAST", 15) + "\n" + LABELS.format(SHAPE), "a chamfer"),
         (CONTOUR.format("FIRST:LAST", 11)[:-1] + ",0)\n" + LABELS.format(SHAPE), "number of arguments"),
         ("G91\n" + CONTOUR.format("FIRST:LAST", 11) + "\nG90\n" + LABELS.format(SHAPE), "in G90 and G40"),
+        (
+            f"MCALL CYCLE81(40,0,1,-5)\n{CONTOUR.format('FIRST:LAST', 11)}\nMCALL\n{LABELS.format(SHAPE)}",
+            "not under MCALL",
+        ),
         ("MCALL " + CONTOUR.format("FIRST:LAST", 11) + "\nX5 Y6\nMCALL\n" + LABELS.format(SHAPE), "by MCALL"),
         *(
             (CONTOUR.format("FIRST:LAST", 11) + "\n" + LABELS.format(f"{SHAPE}\n{block}"), "more than a line")
@@ -177,6 +181,12 @@ def test_a_contour_is_corrected_at_its_points_and_its_cycle_in_depth(calls: str,
 def test_which_contours_are_refused(body: str, why: str) -> None:
     reasons = [each.reason for each in fixed(body).report.refused]
     assert any(why in reason for reason in reasons), reasons
+
+
+def test_contours_that_another_cycle_has_used_are_none_of_the_next() -> None:
+    before = 'CYCLE62("OTHER",0)\nCYCLE63("P",1,40)\nG0 X5 Y6 Z50\nCYCLE62("SHAPE",0)\n'
+    found = fixed(f"{before}{CONTOUR.format('', 11)}\n{SUBPROGRAM.format(SHAPE)}")
+    assert [each.line for each in found.report.refused] == [3]
 
 
 def test_a_contour_is_not_written_out() -> None:
