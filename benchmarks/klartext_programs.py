@@ -39,7 +39,8 @@ def odd_blocks(k: int, at: tuple[float, ...], on: list[str], off: list[str]) -> 
         case 2500:
             return [*off, "TOOL CALL 2 Z S8000", *on, START, here]
         case 3000:
-            return [f"LN X{x:+.4f} Y{y:+.4f} Z{z:+.4f} NX+0 NY+0 NZ+1 F2000", "L R0"]
+            normal = f"LN X{x:+.4f} Y{y:+.4f} Z{z:+.4f} NX+0 NY+0 NZ+1 F2000"
+            return [*off, normal, "L R0", *([*on, START, here] if on else [])]
         case 3500:
             lay = ["PLANE SPATIAL SPA+0 SPB+0 SPC+20 STAY", "L X+60 Y+60 Z+50 R0 FMAX", "PLANE RESET STAY"]
             return [*off, "L B+0 C+0 FMAX", *lay, *on, START, here]

@@ -50,6 +50,20 @@ def test_lines_of_a_shape_are_read_as_one_by_one(family: Family) -> None:
     assert sum(line.plain for line in found) > 1000
 
 
+@pytest.mark.parametrize(
+    ("text", "path"),
+    [
+        ("X50RND=5", "X 50 RND 5"),
+        ("N10G1X-5.5CHF=.2", "X -5.5 CHF .2"),
+        ("X1=4 A3=.5 B=3", "X1 4 A3 .5 B 3"),
+        ("R5=3 _X1=2 $X=1", ""),
+    ],
+)
+def test_words_of_sinumerik_need_no_blanks(text: str, path: str) -> None:
+    found = READERS[Family.SINUMERIK](1, text)
+    assert " ".join(f"{word.name} {word.number}" for word in found.path) == path
+
+
 def test_lines_of_a_shape_are_followed_as_one_by_one() -> None:
     for case in cases(25, 3):
         family = Family.of(case.original, case.language)

@@ -9,7 +9,7 @@ from ncfix.certificate.findings import BlockProof
 from ncfix.certificate.following import Given
 from ncfix.certificate.proof import prove
 from ncfix.compensate import FixOptions
-from ncfix.compensate.driver import fix_program
+from ncfix.compensate.driver import fix_flat, fix_program
 from ncfix.control.setup import Setup, Tool
 from ncfix.text.dialect import get
 from ncfix.text.reader import read
@@ -52,6 +52,17 @@ def test_where_a_cycle_goes_back_to_is_not_guessed() -> None:
     for code in (b"G98 ", b"G99 "):
         proof = proof_of(text % code, "table", {})
         assert (proof.faults, proof.unproved) == ([], 0)
+
+
+def test_a_repeated_cycle_that_is_written_out_is_no_fault() -> None:
+    text = (
+        b"G21 G90 G17 G80\nG0 X0. Y0. Z20.\nG99 G81 X5. Y5. Z-5. R2. F100.\nG91 X20. L3\nG90 G80\nG0 X3. Y1. Z20.\nM2\n"
+    )
+    known, setup = machine("three"), Setup(assume_zero=True)
+    flat = fix_flat(read(text, "part", get("linuxcnc")), known, setup, FixOptions(verify=False, flatten=True)).text
+    assert flat.count(b"\n") > text.count(b"\n") + 2
+    proof = prove(text, flat, known, Given(assume_zero=True), "linuxcnc")
+    assert (proof.faults, proof.proved_motions) == ([], 3)
 
 
 def test_full_circles_end_within_the_tolerance_and_inches_to_the_digit_of_the_control() -> None:

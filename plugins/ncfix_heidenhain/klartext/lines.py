@@ -28,6 +28,7 @@ from ncfix_heidenhain.klartext.transformations import check_normal
 MACHINE_COORDINATES = "machine coordinates ({})"
 NOT_GIVEN = "where the axis {} stands after M92 depends on a datum of the machine that is not given"
 NOT_STRAIGHT = "where the axis {} stands after a path other than L in machine coordinates is not followed"
+SQUARE = "the control turns the tool square to the surface (NX NY NZ under M128), and where to is not worked out"
 ORIENTED = "the control works out the rotary axes (TX TY TZ), and what it finds is not known"
 TURNS_UNDER_TILT = Passing(
     Pass.ROTARY_ALONE, "rotary axes are positioned in a tilted plane; the tip is corrected where it moves next"
@@ -49,6 +50,10 @@ def straight(control: KlartextControl, step: Step) -> None:
     control.use()
     end = destination(control, step.words)
     if not {"TX", "TY", "TZ"} & step.words.values.keys():
+        turning = mask_of(control.turning)
+        if step.name == "ln" and control.m128 and turning and not step.words.axes & turning:
+            control.refuse_here(SQUARE)
+            return
         run(control, step, end, step.words.axes)
         return
     way = None if step.words.unknown else pointed(control, step.words)

@@ -22,11 +22,11 @@ from ncfix.values import frozen
 from ncfix_heidenhain.klartext.arcs import IN_PLANE
 from ncfix_heidenhain.klartext.plans import LETTERS, KlartextPlan, plan_of
 
-STRAIGHT = frozenset({"", "l", "ln"})
+STRAIGHT = frozenset({"", "l"})
 ARCS = {"cr": "R", "c": "", "cp": "IPA"}
 """Arcs in the plane of X and Y, and the address besides axes that each has."""
 
-IDLE = frozenset({"F", "S", "NX", "NY", "NZ"})
+IDLE = frozenset({"F", "S"})
 """Addresses that lead nowhere."""
 
 SIDES = {"r0": 0, "rl": 41, "rr": 42}
@@ -105,7 +105,7 @@ def lane_of(plan: KlartextPlan, slots: Mapping[str, int] | None, axes: int) -> L
         return NOTHING if slots.keys() == {"X", "Y"} and not plan.flags and not plan.codes else None
     if plan.name in ARCS:
         return arc_of(plan, slots) if not (named | IN_PLANE) & ~axes else None
-    if plan.name not in STRAIGHT or (plan.name == "ln" and not slots.keys() & LETTERS):
+    if plan.name not in STRAIGHT:
         return None
     if not slots.keys() <= LETTERS | IDLE or named & ~axes:
         return None

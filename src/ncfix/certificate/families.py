@@ -406,7 +406,9 @@ class WordAddressFollower(AxisFollower):
     def _hole(self, row: int, line: TextLine, words: Mapping[str, TextWord]) -> AxisStep:
         """A drilling cycle at a place: in G17, with absolute words."""
         if self.counting or self.plane != 17 or line.code("K") or line.code("L") or line.word("I") or line.word("K"):
-            return self.step(row, Kind.HOLE, dict(self.at), line, "a drilling cycle that this reader does not know")
+            step = self.step(row, Kind.HOLE, dict(self.at), line, "a drilling cycle that this reader does not know")
+            step.foreign = True  # one that is repeated may be written out
+            return step
         for name in "ZR":
             word = line.word(name)
             if word is not None:

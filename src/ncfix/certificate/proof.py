@@ -236,16 +236,26 @@ class Prover(Deviations):
         return ""
 
     def _roughly(self, step: AxisStep, pair: LinePair) -> None:
-        """Of a block that is not followed: no absolute number may change by more than the largest correction."""
+        """Of a block that is not followed: no absolute number may change by more than the largest correction.
+
+        Nor the place to which it leads, where that is known, but not the way.
+        """
         line, last = self.first.lines[pair.row], self.second.lines[pair.last]
-        if line.odd or line.doubled() or step.foreign or step.kind == Kind.ARC:
+        if line.odd or line.doubled() or step.foreign or pair.first != pair.last:
             return
         most = 2.5 * self.machine.max_correction[0] + 1e-6
-        for word in line.path:
-            other = last.word(word.name)
-            if word.name not in "XYZ" or other is None or word.value is None or other.value is None:
+        other = self.theirs.get(pair.last)
+        if not step.why and other is not None and not other.why:
+            off = np.where(self.machine.rotary, 0.0, np.abs(np.subtract(other.end, step.end)))
+            if (off > most).any():
+                axis = self.machine.axis_names[int(np.nanargmax(off))]
+                self.proof.fault(f"{axis} has changed by more than corrections are", last.number, line.number)
+                return
+        for word in line.path if step.kind != Kind.ARC else ():
+            found = last.word(word.name)
+            if word.name not in "XYZ" or found is None or word.value is None or found.value is None:
                 continue
-            if pair.first == pair.last and abs(other.value - word.value) * step.unit > most:
+            if abs(found.value - word.value) * step.unit > most:
                 self.proof.fault(f"{word.name} has changed by more than corrections are", last.number, line.number)
                 return
 
@@ -375,8 +385,9 @@ class Prover(Deviations):
         loose = full or any(row in self.polar for row in range(pair.first, pair.last + 1))
         loose = loose or abs(step.sweep) > WHOLE_TURN
         if not said.all() and self._changed(pair):
-            most = self.half_steps(step, added=True) + np.where(rotary, TURNED, AS_IF)
-            return (UNSAID, True) if loose or (off <= most).all() else (OFF.format(*self.worst(off, most)), False)
+            near, turned = self.machine.max_correction if loose else (AS_IF, TURNED)
+            most = self.half_steps(step, added=True) + np.where(rotary, turned, near)
+            return (UNSAID, True) if (off <= most).all() else (OFF.format(*self.worst(off, most)), False)
         anew = self.first.family is Family.KLARTEXT and step.kind is Kind.ARC  # a C or CP may have become a CR
         whole = pieces[0] if len(pieces) == 1 else None
         halves = self.half_steps(step, whole, added=anew or whole is None)

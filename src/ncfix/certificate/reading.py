@@ -167,7 +167,7 @@ RETRACTS = "M140 retracts the tool by a way that the control finds"
 CODE = r"[A-Z]{1,2}\d*"
 SINUMERIK_WORD = re.compile(
     rf"(;.*|\"[^\"]*\")"
-    rf"|([A-Z_$][A-Z0-9_$]*)[ \t]*=[ \t]*(?:(IC|AC|DC|ACP|ACN)\([ \t]*({NUMBER})[ \t]*\)|({NUMBER})(?![\w.(*/+])"
+    rf"|([A-Z]\d*|[A-Z_$]{{2}}[A-Z0-9_$]*)[ \t]*=[ \t]*(?:(IC|AC|DC|ACP|ACN)\([ \t]*({NUMBER})[ \t]*\)|({NUMBER})(?![\w.(*/+])"
     rf"|(\"[^\"]*\"|[^;\s]+))"
     rf"|(?<![A-Z_$])([A-Z])({NUMBER})(?![\d.(_$])"
     rf"|([A-Z_$%][A-Z0-9_$]*(?:[ \t]*\((?:[^()]|\([^()]*\))*\))?)"

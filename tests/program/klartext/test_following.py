@@ -219,6 +219,14 @@ def test_what_is_not_sure_is_refused(body: str, reason: str) -> None:
     assert reason in reasons(body)[-1]
 
 
+def test_a_surface_normal_turns_the_tool_under_m128_only() -> None:
+    """TNC7 manual, face milling: without TX TY TZ, M128 holds the tool square to the surface."""
+    normal = "L A0 C0 F100\n%sLN X1 Y2 Z3 %sNX0 NY0.6 NZ0.8"
+    assert "square to the surface" in reasons(normal % ("M128\n", ""), "XYZAC")[-1]
+    assert reasons(normal % ("", ""), "XYZAC") == []
+    assert reasons(normal % ("M128\n", "A5 C9 "), "XYZAC") == []
+
+
 @pytest.mark.parametrize(
     ("body", "code"),
     [
