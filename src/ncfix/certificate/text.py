@@ -140,8 +140,11 @@ class PlainShape(NamedTuple):
 PLAIN_NUMBER = re.compile(rf"({NUMBER})")
 PLAIN_DECIMAL = re.compile(rf"(?<![Rr])({DECIMAL})")
 """Numbers of Klartext, but for that of R0."""
-NUMBER_RUN, DECIMAL_RUN = re.compile("([-+.0-9]+)"), re.compile("((?<![Rr])[-+.,0-9]+)")
+NUMBER_RUN, DECIMAL_RUN = re.compile("([-+.0-9]+)"), re.compile("([-+.,0-9]+)")
 """The same, faster, where all that these find are numbers."""
+AFTER_R = re.compile("[Rr][-+.,0-9]")
+SHOWN = {0x100 + ord(character): character for character in "-+.,0123456789"}
+"""Characters that are hidden while numbers of Klartext are looked for, and as what: those behind an R."""
 MARK = "\0"
 PLAIN_SHAPES = {
     Family.WORDS: re.compile(rf"((?:[ \t]*[A-Za-z][ \t]*{MARK})+)[ \t]*(?:\([^(){MARK}]*\)|;[^{MARK}]*)?"),
@@ -242,8 +245,9 @@ class Lines(Sequence[TextLine]):
         count = min(PART, len(self) - first)
         start, end = int(self.starts[first]), max(int(self.starts[first + count]) - 1, 0)
         text = self.source[start:end].decode("latin-1")
-        pieces, values = self._numbers(text)
-        keys = MARK.join(pieces[::2]).split("\n")[:count]
+        pieces, values = self._numbers(AFTER_R.sub(_hide, text) if self.klartext else text)
+        left = MARK.join(pieces[::2])
+        keys = (left if left.isascii() else left.translate(SHOWN)).split("\n")[:count]
         kinds = np.fromiter((known.setdefault(key, len(known)) for key in keys), np.int32, count)
         lengths = np.fromiter(map(len, pieces), np.int32, len(pieces))
         ends, sizes = np.cumsum(lengths, dtype=np.int32)[1::2] + np.int32(start), lengths[1::2].copy()
@@ -370,6 +374,10 @@ class Lines(Sequence[TextLine]):
         if any(name in other for name, _ in codes):
             return None
         return PlainShape(tuple(path), tuple(codes), "".join(pieces), tuple(held), head > 0)
+
+
+def _hide(found: re.Match[str]) -> str:
+    return found[0][0] + chr(0x100 + ord(found[0][1]))
 
 
 FACTOR = 0x9E3779B97F4A7C15
