@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ncfix.certificate.expected import SLACK, Expected, PoseColumns
 from ncfix.certificate.model import LEVER, Array, Mask, Ways
 from ncfix.certificate.pairing import LinePair
-from ncfix.certificate.steps import Kind
+from ncfix.certificate.steps import AxisStep, Kind
 from ncfix.certificate.text import Indices
 
 MANY, FEW = 11, 3
@@ -110,6 +110,19 @@ class Deviations(Expected):
             square = np.maximum(np.einsum("ij,ij,j->i", way, way, weight), 1e-12)
             share = np.clip(share + np.einsum("ij,ij,j->i", off, way, weight) / square, 0.0, 1.0)
         return share
+
+    def unfollowed(self, step: AxisStep, pieces: Sequence[AxisStep]) -> str:
+        """Why what stands for a motion cannot be followed."""
+        for piece in pieces:
+            if piece.why:
+                return piece.why
+            if any(map(math.isnan, piece.end)):
+                return "where an axis stands is not known"
+        if not self.sure[self.ours.at[step.row]]:
+            return "the machine model has no answer"
+        if self.machine.depends_on_direction and not self.sure_of_side(step):
+            return "play: the side of an axis is not known to this reader"
+        return ""
 
     def aside(self, at: Indices) -> Array:
         """How far even turns of axes lead the tool out of the plane in which it is to turn, of steps (m,), rad."""

@@ -309,7 +309,7 @@ class Prover(Deviations):
         broken = next((piece.why for piece in pieces if piece.why in (NO_POLE, NO_CENTRE, NO_CIRCLE)), "")
         if broken:
             self.proof.fault(broken, line, number)
-        elif why := self._pieces(step, pieces):
+        elif why := self.unfollowed(step, pieces):
             self.proof.leave(why, number)
         else:
             self.proof.fault("the block does not move as it did", line, number)
@@ -349,19 +349,6 @@ class Prover(Deviations):
         same = np.ones(len(moved.row), dtype=bool)
         same[owner[~alike]] = False
         return same
-
-    def _pieces(self, step: AxisStep, pieces: Sequence[AxisStep]) -> str:
-        """Why what stands for a motion cannot be followed."""
-        for piece in pieces:
-            if piece.why:
-                return piece.why
-            if any(map(math.isnan, piece.end)):
-                return "where an axis stands is not known"
-        if not self.sure[self.ours.at[step.row]]:
-            return "the machine model has no answer"
-        if self.machine.depends_on_direction and not self.sure_of_side(step):
-            return "play: the side of an axis is not known to this reader"
-        return ""
 
     def _end(self, step: AxisStep, pieces: Sequence[AxisStep], pair: LinePair) -> tuple[str, bool]:
         """What is wrong with the end of a motion, and whether that is only not proved."""
