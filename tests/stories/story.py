@@ -7,16 +7,20 @@ next one are what it prints on a terminal (standard error included), and a line 
 
 from __future__ import annotations
 
+import io
 import math
 import os
 import re
 import shlex
-import subprocess
-import sys
 from collections.abc import Iterator, Sequence
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import cast
+from unittest.mock import patch
+
+from ncfix.cli import main
 
 FENCE = re.compile(r"(?<=^```console\n).*?(?=^```$)", re.MULTILINE | re.DOTALL)
 LEFT_OUT = "..."
@@ -52,25 +56,32 @@ def _steps(block: str) -> Iterator[Step]:
 
 
 def run(command: str, folder: Path) -> list[str]:
-    """The lines that a command prints in a folder; `> FILE` at its end puts its standard output there instead.
+    """The lines that a command, run in this process, prints in a folder; `> FILE` at its end puts its standard output
+    there instead.
 
     RuntimeError: it ended with a fault, or cannot read a file.
     """
     program, *arguments = shlex.split(command)
     if program != "ncfix":
         raise ValueError(f"{command}: a story runs ncfix only")
-    target = folder / arguments[-1] if arguments[-2:-1] == [">"] else None
-    done = subprocess.run(
-        [str(Path(sys.executable).with_name("ncfix")), *(arguments[:-2] if target else arguments)],
-        cwd=folder, text=True, check=False, timeout=300, env={**os.environ, "NO_COLOR": "1", "COLUMNS": "120"},
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE if target else subprocess.STDOUT,
-    )  # fmt: skip
-    printed = done.stderr if target else done.stdout
-    if done.returncode not in ENDS:
-        raise RuntimeError(f"{command}: exit code {done.returncode}\n{printed}")
-    if target:
-        target.write_text(done.stdout)
+    target = arguments[-1] if arguments[-2:-1] == [">"] else None
+    told = io.TextIOWrapper(io.BytesIO(), "utf-8", newline="")
+    written = io.TextIOWrapper(io.BytesIO(), "utf-8", newline="") if target else told
+    with chdir(folder), patch.dict(os.environ, {"NO_COLOR": "1", "COLUMNS": "120"}):
+        with redirect_stdout(written), redirect_stderr(told):
+            code = main.run(arguments[:-2] if target else arguments)
+        printed, output = (text_of(each) for each in (told, written))
+        if code not in ENDS:
+            raise RuntimeError(f"{command}: exit code {code}\n{printed}")
+        if target:
+            Path(target).write_text(output)
     return printed.rstrip("\n").split("\n") if printed else []
+
+
+def text_of(written: io.TextIOWrapper) -> str:
+    """What was written."""
+    written.flush()
+    return cast(io.BytesIO, written.buffer).getvalue().decode()
 
 
 def alike(shown: tuple[str, ...], printed: list[str]) -> bool:
