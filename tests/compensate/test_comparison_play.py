@@ -15,6 +15,7 @@ from scipy.spatial import KDTree
 
 from compensate.side import compared
 from compensate.test_comparison import fixed, largest, moves_of
+from conftest import some
 from ncfix.compensate.figures.backlash import BacklashBodies
 from ncfix.compensate.figures.curve import Stretches
 from ncfix.compensate.plan.intent import Intent
@@ -155,7 +156,7 @@ def test_steps_that_take_up_play_are_missed(machine: Machine, texts: tuple[str, 
         assert max(expected) > LIMIT
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(some(3)))
 def test_arcs_and_rapids_and_several_axes_that_turn_at_once(machine: Machine, seed: int) -> None:
     """Arcs on which axes turn round, just behind their begin, too, and rapids in which corrections turn axes round."""
     rng, at = np.random.default_rng(seed), np.array([20.0, 20.0, 0.0])

@@ -9,11 +9,12 @@ from zlib import crc32
 
 import pytest
 
+from conftest import FULL
 from goldens import programs, verbs
 from goldens.__main__ import SECONDS, read
 from goldens.case import LATE, Case, Workplace, digest
 
-EACH = 10
+EACH = 10 if FULL else 4
 """Cases of a group."""
 
 

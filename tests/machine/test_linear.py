@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from conftest import some
 from machine import chains
 from ncfix.machine import Effect, Machine, State, se3
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
@@ -23,7 +24,7 @@ def pose_difference(high: np.ndarray, low: np.ndarray) -> np.ndarray:
     return np.concatenate([high[..., :3, 3] - low[..., :3, 3], turn], axis=-1)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=some(30), deadline=None)
 @given(seed=seeds, joints=st.integers(1, 7))
 def test_axis_jacobians_are_central_differences(seed: int, joints: int) -> None:
     rng = np.random.default_rng(seed)
@@ -37,7 +38,7 @@ def test_axis_jacobians_are_central_differences(seed: int, joints: int) -> None:
     np.testing.assert_array_equal(machine.axis_jacobian(q, length), jacobian)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=some(30), deadline=None)
 @given(seed=seeds, joints=st.integers(1, 6))
 def test_joint_jacobians_are_differences_of_the_exact_model(seed: int, joints: int) -> None:
     """Each component of each joint, and of the spindle, as a constant error of +-h."""
@@ -67,7 +68,7 @@ def moving_frames(rng: np.random.Generator, machine: Machine) -> Machine:
     return machine.replace(axes=axes)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=some(30), deadline=None)
 @given(seed=seeds, joints=st.integers(1, 6))
 def test_first_order_differs_from_exact_by_second_order(seed: int, joints: int) -> None:
     """All kinds of effects with their own reference points, carried or not: halving the errors quarters the gap."""
@@ -84,7 +85,7 @@ def test_first_order_differs_from_exact_by_second_order(seed: int, joints: int) 
     assert gaps[1] < 0.3 * gaps[0]
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=some(20), deadline=None)
 @given(seed=seeds)
 def test_the_design_matrix_times_the_coefficients_is_the_first_order_error(seed: int) -> None:
     rng = np.random.default_rng(seed)

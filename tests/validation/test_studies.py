@@ -7,13 +7,14 @@ import os
 import numpy as np
 import pytest
 
+from conftest import FULL
 from diagnose.tables import put
 from validation import accuracy, plans, random_chains, round_trips
 
 QUICK = (0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11)
 """Chains whose formulas take a second or so; some of four revolute joints, or three skew ones, take a minute."""
 CHAINS = range(int(os.environ["NCFIX_CHAINS"])) if "NCFIX_CHAINS" in os.environ else QUICK
-DRAWS = int(os.environ.get("NCFIX_DRAWS", "4"))
+DRAWS = int(os.environ.get("NCFIX_DRAWS", "4" if FULL else "2"))
 EXACT = 1e-12
 """Relative: a few dozen products in double precision."""
 

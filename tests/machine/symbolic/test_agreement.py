@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from pytransform3d.rotations import compact_axis_angle_from_matrix
 
+from conftest import some
 from machine import chains, oracle
 from machine.chains import a_few_errors, arguments, near_axes
 from ncfix.machine import Axis, Machine, State
@@ -17,7 +18,7 @@ from ncfix.machine.symbolic.printing import compiled
 RELATIVE = 1e-12
 """Both sides are a few dozen products in double precision."""
 LENGTH = 120.0
-CHAINS, LONGEST = 12, 5
+CHAINS, LONGEST = some(24), 5
 """How many random chains, of how many joints at most; tests/validation/random_chains.py compares a thousand."""
 REACH = 1000.0
 """mm: the size of a chain with points, strokes and a tool of a few hundred mm each."""
@@ -55,7 +56,7 @@ def largest_angle(values: dict[str, np.ndarray]) -> float:
 
 
 @pytest.mark.parametrize("frame", [False, True])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(some(3)))
 def test_error_axes_and_moving_error_frames(seed: int, frame: bool) -> None:
     rng = np.random.default_rng(seed)
     plain = near_axes(rng, chains.random_chain(rng, 3))
@@ -88,7 +89,7 @@ def test_every_column_equals_the_jacobian_of_its_joint(topology: str) -> None:
             np.testing.assert_allclose(column, jacobian[:, :, joint, k], rtol=0, atol=REACH * RELATIVE)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(some(3)))
 def test_first_order_equals_numeric_differentiation_of_an_independent_chain(seed: int) -> None:
     """Central differences of fourth order of the oracle's exact composition: good to 1e-9."""
     rng = np.random.default_rng(seed)
@@ -115,7 +116,7 @@ def six(actual: np.ndarray, nominal: np.ndarray) -> np.ndarray:
     return np.concatenate([actual[:3, 3] - nominal[:3, 3], compact_axis_angle_from_matrix(turn)])
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(some(4)))
 def test_second_order_explains_the_remainder(seed: int) -> None:
     """Exact minus first order shrinks with the square of the errors, exact minus second order with the cube."""
     rng = np.random.default_rng(seed)
