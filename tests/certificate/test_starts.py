@@ -227,3 +227,12 @@ def test_a_surface_normal_is_not_followed_and_all_behind_it_is() -> None:
     assert (proof.faults, proof.motions, proof.proved_motions) == ([], 6, 4)
     assert "surface normal" in proof.left[6]
     assert sorted(proof.left) == [6, 7]  # pieces may belong to either
+
+
+def test_an_end_of_the_program_that_is_lost_is_a_fault() -> None:
+    text = b"%\nO1(A)\nG21 G90 G17\nG0 X1. Y2. Z9.\nG1 X5. F300.\nM30\n%\n"
+    known, setup, given = machine("three"), Setup(assume_zero=True), Given(assume_zero=True)
+    fixed = fix_program(read(text, "part", get("fanuc")), known, setup, FixOptions(verify=False)).text
+    assert prove(text, fixed, known, given, "fanuc").faults == []
+    for lost in (b"M30\n", b"M30\n%\n", b"\n%\n"):
+        assert prove(text, fixed.replace(lost, b"\n" if lost[:1] == b"\n" else b""), known, given, "fanuc").faults

@@ -151,7 +151,8 @@ class AxisFollower:
 
     def _line(self, row: int, line: TextLine, log: ProgramSteps) -> None:
         """Follow one line."""
-        if line.odd or (self.lost and any(map(REWRITTEN.match, self.lost))):
+        behind = self.ended and not (line.path or line.codes)  # the % that is last stays where it is
+        if line.odd or (self.lost and not behind and any(map(REWRITTEN.match, self.lost))):
             self.foreign.add(row)
         if line.skipped and self.given.skip is None:
             self.lost["switches"] = "the program has too many switches of block delete"
