@@ -28,7 +28,7 @@ from ncfix.text.tree import (
     Unary,
     Word,
 )
-from ncfix_siemens.sinumerik.cycles import PATTERNS
+from ncfix_siemens.sinumerik.cycles.drilling import PATTERNS
 from ncfix_siemens.sinumerik.plans import AssignedVariable, Calling, has_value, names_in
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.statements import Turn

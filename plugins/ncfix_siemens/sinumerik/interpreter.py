@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ncfix.control.control import MOVED_AS_A_WHOLE
 from ncfix.control.coordinates import INDEX, LETTERS, mask_of
 from ncfix.control.expressions import number
 from ncfix.control.flatten import NOT_FLAT
@@ -25,20 +24,10 @@ from ncfix.control.setup import Run
 from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Place, RefusedError, SourceError
 from ncfix.text.tree import Program
-from ncfix_siemens.sinumerik.cycles import along_contour, made
+from ncfix_siemens.sinumerik.cycles.contour import mill_along
 from ncfix_siemens.sinumerik.destination import destination
-from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow, Stretch
+from ncfix_siemens.sinumerik.flow import AtRuntimeError, SinumerikFlow
 from ncfix_siemens.sinumerik.framing import PROGRAMMABLE
-from ncfix_siemens.sinumerik.milling import (
-    ALONG,
-    NO_CONTOUR,
-    NO_START,
-    NOT_ALONE,
-    NOT_REWRITTEN,
-    contour_named,
-    milling_of,
-    start_of,
-)
 from ncfix_siemens.sinumerik.motion import is_harmless, watch
 from ncfix_siemens.sinumerik.orientation import leads_along, run_vectors
 from ncfix_siemens.sinumerik.plans import (
@@ -282,7 +271,11 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             flow.follow((Call(lambda: flow.called(called, turn.arguments, turn.written, turn.times)),))
             return False
         if turn.contour is not None:
-            self.mill_along(turn.contour, turn.words, block)
+            if self.in_parts:
+                raise NotInPartsError("a contour stands elsewhere in the program")
+            if self.watcher is not None:
+                raise RefusedError.of(NOT_FLAT, CONTOUR.format(turn.contour.name.upper()), self.place())
+            mill_along(self.control, flow, turn.contour, turn.words, block, self.find, self.evaluate)
             return False
         steps = [step for step in plan.steps if isinstance(step, Branching)]
         if steps:
@@ -302,40 +295,6 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         if turn.ends or not PROGRAM_ENDS.isdisjoint(turn.m):
             flow.finish()
         return flow.ended
-
-    def mill_along(self, step: Calling, words: BlockWordValues, block: int) -> None:
-        """A cycle that mills along a contour: down to its bottom where that begins, then block after block."""
-        if self.in_parts:
-            raise NotInPartsError("a contour stands elsewhere in the program")
-        control, modal, called = self.control, self.control.modal, step.name.upper()
-        drilling, name = milling_of(control, step, modal=False), contour_named(control, step)
-        fault, found = drilling.fault, self.flow.stretch(name, self.find)
-        if words.axes or modal.incremental or modal.compensated or control.modes.modal_cycle is not None:
-            fault = fault or NOT_ALONE
-        if found is None:
-            made(control, block, refusal=(fault or NO_CONTOUR).format(called))
-            return
-        if control.external or found.unit.external:
-            fault = fault or NOT_REWRITTEN
-        place, wrong = self.start_of(found)
-        if self.watcher is not None:
-            raise RefusedError.of(NOT_FLAT, CONTOUR.format(called), self.place())
-        if fault or wrong:
-            made(control, block, refusal=(fault or wrong).format(called))
-            return
-        control.warn(MOVED_AS_A_WHOLE, ALONG.format(called))
-        self.flow.go_along(found, name, along_contour(control, block, drilling, place))
-
-    def start_of(self, contour: Stretch) -> tuple[tuple[float, float], str]:
-        """Where a contour begins, in program units, and why it cannot be followed."""
-        control, unit = self.control, contour.unit
-        first, wrong = start_of(control, [unit.plan(block) for block in range(contour.start, contour.stop)])
-        control.numbers, control.first = unit.numbers, unit.first[contour.start + first]
-        words = self.evaluate(unit.plan(contour.start + first), contour.start + first)
-        one, two = (words.values.get(letter) for letter in control.modal.plane.of(LETTERS))
-        if one is None or two is None or words.forms:
-            return (0.0, 0.0), wrong or NO_START
-        return (one, two), wrong
 
     def opaque(self, plan: SinumerikPlan, text: str) -> None:
         """Text that is no motion, or that nobody understands."""

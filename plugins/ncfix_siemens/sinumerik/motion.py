@@ -11,7 +11,7 @@ from ncfix.control.control import AFTER_THAT
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, mask_of
 from ncfix.control.moves import MotionEnd, MotionKind, Pass, Passing
 from ncfix_siemens.sinumerik.circles import OF_ARCS, OF_CIP, arc, misled, tangential, through_point
-from ncfix_siemens.sinumerik.cycles import TO_A_HOLE, drill, hole_after
+from ncfix_siemens.sinumerik.cycles.drilling import TO_A_HOLE, drill, hole_after
 from ncfix_siemens.sinumerik.destination import destination, doubtful_polar, machine_destination
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.orientation import oriented

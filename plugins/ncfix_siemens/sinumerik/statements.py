@@ -16,11 +16,12 @@ from ncfix.control.frames import WORLD
 from ncfix.text.tree import Expression, FunctionCall, NamedParameter, NumberedParameter
 from ncfix.values import mutable
 from ncfix_siemens.sinumerik import framing, motion
-from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
+from ncfix_siemens.sinumerik.cycles.contour import contour_call
+from ncfix_siemens.sinumerik.cycles.drilling import AFTER_CYCLE, cycle
+from ncfix_siemens.sinumerik.cycles.milling import MILLING
 from ncfix_siemens.sinumerik.destination import set_pole
 from ncfix_siemens.sinumerik.expressions import compiled
 from ncfix_siemens.sinumerik.framing import into_spindle, set_length
-from ncfix_siemens.sinumerik.milling import MILLING, contour_call
 from ncfix_siemens.sinumerik.orientation import swivel
 from ncfix_siemens.sinumerik.plans import LISTS, AssignedVariable, Calling, SinumerikPlan, evaluates, plain_text
 from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik

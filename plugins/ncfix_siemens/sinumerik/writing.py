@@ -48,8 +48,8 @@ from ncfix.values import frozen
 from ncfix.writer.block import BlockWriter
 from ncfix.writer.target import LINE, TANGENTIAL, Target
 from ncfix_siemens.sinumerik.circles import VIA, circle_through
+from ncfix_siemens.sinumerik.cycles.milling import MILLING
 from ncfix_siemens.sinumerik.destination import turned
-from ncfix_siemens.sinumerik.milling import MILLING
 from ncfix_siemens.sinumerik.scanning import has_partial
 from ncfix_siemens.sinumerik.vocabulary import (
     ANGLES,

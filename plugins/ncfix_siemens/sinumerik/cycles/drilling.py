@@ -11,14 +11,13 @@ Holes in a row (HOLES1) and on a circle (HOLES2): where the control takes the mo
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from copy import copy
+from collections.abc import Sequence
 
 from ncfix.control.coordinates import LETTERS, mask_of, rotated
 from ncfix.control.expressions import number
 from ncfix.control.moves import CycleCall, MotionEnd, MotionKind, Pass, Passing
+from ncfix_siemens.sinumerik.cycles.milling import MILLING, OTHER_PLANE, PLANES, milling_of, said_in
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
-from ncfix_siemens.sinumerik.milling import MILLING, OTHER_PLANE, PLANES, milling_of, said_in
 from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import (
@@ -231,27 +230,6 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
         named, over, _ = lead_to(control, block, drilling.place, name)
         control.builder.rests(mask_of(index for index in control.machine if index not in GEOMETRY))
     drill(control, named, over, drilling, refusal=WITH_WORDS if words.axes else "")
-
-
-def along_contour(control: Sinumerik, block: int, drilling: Drilling, place: tuple[float, float]) -> Callable[[], None]:
-    """Down to the bottom of a contour, where that begins; what is to be done behind its last block."""
-    take_up(control)
-    mind_carried(control)
-    control.use_all_start_positions()
-    assert drilling.depth is not None
-    named, over, _ = lead_to(control, block, place, drilling.name)
-    control.builder.rests(mask_of(index for index in control.machine if index not in GEOMETRY))
-    modal, stated, down = copy(control.modal), control.stated, at_height(control, over, drilling.depth)
-    drill(control, named, over, drilling)
-    up = control.here()
-    control.stand(down.target, down.unknown, down.lost)
-    control.contour = True
-
-    def leave() -> None:
-        control.modal, control.stated, control.contour = modal, stated, False
-        control.stand(up.target, up.unknown, up.lost)
-
-    return leave
 
 
 def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:

@@ -1,8 +1,5 @@
 """Milling cycles that say at which place and how deep they work: pockets, slots, studs, faces, threads.
 
-One that mills along a contour (CYCLE72) goes down where that begins, and the blocks of the contour are followed at its
-bottom; so each of its points is corrected where it stands.
-
 Such a cycle is one motion to its bottom at the place that its call names, and is moved as a whole: its place, the
 height that it counts from (RFP) and its bottom by the same way. So it keeps its size and its steps in depth. What
 counts from RFP (DPR, a way down in DP, the depth of a chamfer) stays as it is written.
@@ -13,13 +10,12 @@ controls: "SINUMERIK, cycles".
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
-from ncfix.control.coordinates import CENTRE_LETTERS, LETTERS, Plane, X, Y, Z
+from ncfix.control.coordinates import X, Y, Z
 from ncfix.control.expressions import Unknown
 from ncfix.values import frozen
-from ncfix_siemens.sinumerik.plans import Branching, Calling, SinumerikPlan
+from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import DP, DPR, RFP, RTP, Drilling
 
@@ -199,66 +195,3 @@ def milling_of(control: Sinumerik, step: Calling, *, modal: bool) -> Drilling:
         None if modal or form.named else call.place,
         () if modal else call.points,
     )
-
-
-# -- contours ----------------------------------------------------------------------------------------------------------
-
-CONTOUR_WORDS = frozenset({*CENTRE_LETTERS, "CR", "AR", "RND", "CHF", "CHR", "F"})
-CONTOUR_CODES = frozenset({0, 10, 20, 30, 400, 900})
-CONTOUR_NAMES = frozenset({"diamof", "ret"})
-ENDS = frozenset({20, 170})
-"""M2 and M17."""
-CONTOURS = {0: "{0}", 1: "E_LAB_A_{0}:E_LAB_E_{0}", 2: "{1}:{2}"}
-"""What CYCLE62 means by its second argument: a subprogram, a contour of the editor, two labels."""
-
-NO_CONTOUR = "the contour of {} is not found: it has to be a subprogram, or to stand between two labels"
-NOT_REWRITTEN = "{} or its contour is in the file of a subprogram, which is not rewritten"
-OTHER_BLOCK = "the contour of {} has a block that is more than a line or an arc in the plane in force"
-NO_START = "the contour of {} does not begin with G0 or G1 to a place of which both words are known numbers"
-NOT_ALONE = "{} has to be called in a block by itself, in G90 and G40, and not under MCALL"
-ALONG = "{} is corrected at each point of its contour, at its bottom; its depth is corrected where the contour begins"
-
-
-def contour_named(control: Sinumerik, step: Calling) -> str:
-    """The contour that a call of CYCLE72 names, itself or by one CYCLE62 before it; empty if it names none."""
-    said, _ = said_in(control, step)
-    name = said[0] if said and isinstance(said[0], str) else ""
-    if not name and len(control.contours) == 1:
-        name = control.contours[0]
-    control.milled = True
-    return name
-
-
-def contour_call(control: Sinumerik, step: Calling) -> None:
-    """CYCLE62: one more contour for the next cycle."""
-    said, _ = said_in(control, step)
-    name, kind, first, last = (*said, *[None] * 4)[:4]
-    form = CONTOURS.get(round(kind) if isinstance(kind, float) else 0, "")
-    control.contours = [] if control.milled else control.contours
-    control.contours.append(form.format(name or "", first or "", last or ""))
-    control.milled = False
-
-
-def start_of(control: Sinumerik, plans: Sequence[SinumerikPlan]) -> tuple[int, str]:
-    """Which of the blocks of a contour leads to where it begins, and why they are none."""
-    plane = control.modal.plane
-    end = next((place for place, plan in enumerate(plans) if "ret" in plan.names or not ENDS.isdisjoint(plan.m)), None)
-    if not all(may_be_contour(plan, plane) for plan in plans[: None if end is None else end + 1]):
-        return 0, OTHER_BLOCK
-    first = next((place for place, plan in enumerate(plans) if plan.axes), 0)
-    starts = plans[first].axes == plane.axes and not {0, 10}.isdisjoint(plans[first].g)
-    return first, "" if starts else NO_START
-
-
-def may_be_contour(plan: SinumerikPlan, plane: Plane) -> bool:
-    """Whether a block leads along a line or an arc in the plane, if anywhere, and does nothing else."""
-    for step in plan.steps:
-        match step:
-            case Calling(name) if name in CONTOUR_NAMES:
-                continue
-            case Branching("label"):
-                continue
-        return False
-    others = {setting.address for setting in plan.settings} - CONTOUR_WORDS - {*plane.of(LETTERS)}
-    quiet = plan.skip is None and plan.opaque <= {"program head"} and ENDS.issuperset(plan.m)
-    return quiet and not others and plan.axes & ~plane.axes == 0 and CONTOUR_CODES | {plane.code} >= {*plan.g}

@@ -1,0 +1,1 @@
+"""Cycles of SINUMERIK: drilling, patterns of holes, milling, contours."""
