@@ -234,15 +234,44 @@ def test_radians_at_no_round_degree_are_told_by_how_far_they_go():
 )
 def test_linear_positions_in_another_unit_are_remarked(size: float, code: str, said: str):
     low, high = THREE.axis("X").range  # type: ignore[union-attr]
-    head = "# ncfix-measurement: 1\n# kind: axis\naxis,component,position,value\n"
+    head = "# ncfix-measurement: 1\n# kind: axis\n# sense: body\naxis,component,position,value\n"
     rows = "".join(f"X,EXX,{place * size:.5f},0.001\n" for place in np.linspace(low, 0.9 * high, 6))
     found = reads((head + rows).encode(), THREE).remarks
     assert [message.code for message in found] == ([code] if code else [])
     assert all(said in message.text + message.hint for message in found)
 
 
+def test_ends_of_lengths_in_inches_are_remarked():
+    low, high = THREE.axis("X").range  # type: ignore[union-attr]
+    rows = "".join(f"{low / 25.4:.4f},0,0,{place / 25.4:.4f},0,0,{place - low}\n" for place in (0.5 * high, 0.9 * high))
+    found = reads((GAUGE + rows).encode(), THREE).remarks
+    assert [message.code for message in found] == ["NCF614"]
+    assert "inches" in found[0].text
+
+
+@pytest.mark.parametrize(("size", "code"), [(0.5, "NCF616"), (5e-3, ""), (5e-8, "NCF616")])
+def test_positioning_no_machine_has_is_remarked(size: float, code: str):
+    """Half a millimetre is more than ten times what is much (30 um); no laser tells less than a tenth of a um."""
+    head = "# ncfix-measurement: 1\n# kind: axis\n# sense: body\naxis,component,position,value\n"
+    rows = "".join(f"X,EXX,{10 * k},{k % 3 * size}\n" for k in range(1, 9))
+    assert remarks(head + rows) == ({code} if code else set())
+
+
+def test_positioning_of_a_table_says_in_which_sense_it_counts():
+    head = "# ncfix-measurement: 1\n# kind: axis\n"
+    rows = "axis,component,position,value\nX,EXX,0,0.001\nX,EXX,50,0.004\nX,EYX,50,0.002\nZ,EZZ,50,0.003\n"
+    assert remarks(head + rows) == {"NCF626"}
+    assert not remarks(head + rows.replace("X,EXX,0,0.001\nX,EXX,50,0.004\n", ""))
+    for sense, factor in (("body", 1), ("axis", -1)):
+        found = reads(f"{head}# sense: {sense}\n{rows}".encode(), THREE)
+        assert not found.remarks
+        assert found.columns["value"].tolist() == [factor * 0.001, factor * 0.004, 0.002, 0.003]
+        assert reads(dumps(found).encode(), THREE).columns["value"].tolist() == found.columns["value"].tolist()
+    assert faults(f"{head}# sense: laser\n{rows}") == [("NCF603", 3, 10)]
+
+
 def test_direct_readings_in_radians_or_micrometres_are_remarked():
-    head = "# ncfix-measurement: 1\n# kind: axis\naxis,component,position,value\n"
+    head = "# ncfix-measurement: 1\n# kind: axis\n# sense: body\naxis,component,position,value\n"
     turns = "".join(f"C,ECC,{np.deg2rad(30 * k):.6f},{4 * k}e-6\n" for k in range(12))
     assert remarks(head + turns, FIVE) == {"NCF614"}
     assert remarks(head + turns.replace("e-6", ""), FIVE) == {"NCF614", "NCF616"}
@@ -392,7 +421,7 @@ def test_a_run_that_turns_back_approaches_its_targets_from_both_sides():
 
 def test_deviations_in_millimetres_are_remarked():
     small = re.sub(r"(?m)^([12] [123]) (.*)$", lambda row: f"{row[1]} {float(row[2]) / 1000:.4f}", RTL)
-    assert remarks(small) == {"NCF618"}
+    assert remarks(small) == {"NCF616"}
 
 
 @pytest.mark.parametrize(

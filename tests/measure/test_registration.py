@@ -125,7 +125,7 @@ def test_an_arm_whose_target_is_nearly_on_its_last_axis_is_calibrated(noise):
     poses = reads("".join([head, *(f"{row},P\n" for row in rows)]).encode(), arm, plan=True)
     sizes = {"EX0B": 1.5, "EZ0C": -1.2, "EB0D": 4e-3, "EX0E": 0.8, "EA0B": -1e-3, "EB0E": 2e-3}
     real = arm.replace(effects=tuple(Effect(name, (size,)) for name, size in sizes.items()))
-    found = calibrate([simulate(poses, real, Faults(noise_um=200.0), seed=2)], arm, "E?0?")
+    found = calibrate([simulate(poses, real, Faults(noise_um=200.0), seed=2)], arm)
     assert found.before_um > 3 * found.after_um
     assert found.after_um == pytest.approx(200.0, rel=0.25)  # 120 values, 25 unknowns: 10 % by chance, 11 % by the fit
     assert np.nanmax(np.abs(found.estimate.coefficients)) < 20.0  # mm; all are known to a few

@@ -113,7 +113,8 @@ def calibrate(
 ) -> Calibrated:
     """Estimate the errors of a machine from measurements.
 
-    effects  names or patterns, or a model; None: those of the machine file, or of one without, all that can be
+    effects  names or patterns, or a model; None: those of the machine file, or of one without, all that can be (of an
+             arm where its joints lie)
     loss     "auto", "none", "huber" or "tukey"; the other arguments are those of `ncfix calibrate`
     path     what the machine is called in messages
     """

@@ -95,8 +95,8 @@ def calibrate(
 ) -> int:
     """Estimate the errors of a machine from measurements and write the machine with them.
 
-    Without --effects those of the machine file are estimated; of a machine without effects, all that can be. Exit
-    code 4: the result does not describe the measurements, and nothing was written.
+    Without --effects those of the machine file are estimated; of a machine without effects, all that can be, of an arm
+    where its joints lie. Exit code 4: the result does not describe the measurements, and nothing was written.
     """
     from ncfix.machine import dumps
     from ncfix.measure.reader import reads
@@ -429,7 +429,9 @@ def diagnose(
     else:
         console.put(text(diagnosis))
         if output and written is None:
-            console.say("no machine file was written: there is nothing to add to the model")
+            torn = diagnosis.mistake is not None and diagnosis.mistake.torn
+            why = "the readings may be wrong instead" if torn else "there is nothing to add to the model"
+            console.say(f"no machine file was written: {why}")
     return ExitCode.FINDINGS if check and diagnosis.verdict != NOTHING else ExitCode.DONE
 
 

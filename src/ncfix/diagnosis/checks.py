@@ -25,6 +25,7 @@ STRANGE = 3e3
 """Residuals, rms um, that no machine has, per mm of what is much of where an axis lies (an arm errs more)."""
 MOST_VALUES = 1800
 """Values that are weighed together: work grows with their third power, memory with the second."""
+STAYED = "`ncfix plan` proposes poses; a test of drift needs a column time_s or temperatures"
 CONTRADICTION = 1e-6
 MISSTATED = 2.0
 """Times by which repeats may scatter more or less than the noise that is stated."""
@@ -59,8 +60,8 @@ def before(measurements: Sequence[Measurement], machine: Machine) -> None:
     """Refuse what can be told without computing: one pose, no noise. Raises `UsageError` NCF651, NCF652."""
     q = np.concatenate([each.positions(machine) for each in measurements])
     direct = any(each.kind in ("axis", "length") for each in measurements)
-    if not direct and float(np.ptp(q, axis=0).max(initial=0.0)) < 1e-3:
-        raise UsageError.of("NCF651", f"all {len(q)} rows are of one pose", hint="`ncfix plan` proposes poses")
+    if not direct and not any(each.stays for each in measurements) and float(np.ptp(q, axis=0).max(initial=0.0)) < 1e-3:
+        raise UsageError.of("NCF651", f"all {len(q)} rows are of one pose", hint=STAYED)
     seen = Problem.of(measurements, machine, _nothing(machine))
     if not any(each.noise_known for each in seen.observations) and len(q) < NEIGHBOURS:
         text = f"neither repeats nor a noise_um line, and {len(q)} rows are too few to tell the noise from neighbours"
@@ -94,11 +95,11 @@ def agreeing(data: ResidualData, residual: Array, sigma: float) -> None:
         return
     apart, pairs = 0.0, 0
     q = np.round(data.q, 6)
-    places: dict[tuple[bytes, float, int], list[tuple[int, float]]] = {}
+    places: dict[tuple[bytes, float, str], list[tuple[int, float]]] = {}
     length = data.column("tool_length")
-    for value, row, part in zip(residual / data.relative, data.row, data.component, strict=True):
+    for value, row, name in zip(residual / data.relative, data.row, data.names, strict=True):
         if row >= 0:
-            key = (q[row].tobytes(), float(length[row]), int(part))
+            key = (q[row].tobytes(), float(length[row]), name)
             places.setdefault(key, []).append((int(data.file[row]), float(value)))
     for found in places.values():
         by_file = {file: float(np.mean([v for f, v in found if f == file])) for file, _ in found}

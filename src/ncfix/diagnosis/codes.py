@@ -14,7 +14,7 @@ CODES = {
     "NCF651": Code(
         "all poses are alike",
         "No axis was moved, or all rows are repeats of one pose: an error that depends on the pose cannot show.",
-        "`ncfix plan` proposes poses.",
+        "`ncfix plan` proposes poses. A test of drift at one pose needs a column `time_s`, or temperatures.",
     ),
     "NCF652": Code(
         "the noise is not known",
@@ -31,8 +31,8 @@ CODES = {
     "NCF654": Code(
         "this does not look like that machine",
         "What is left after the set-up was fitted is far larger than errors of machine tools are, and no mistake of "
-        "unit, sign or axis that ncfix knows explains it.",
-        "Is it the measurement of another machine, or are columns exchanged?",
+        "unit, sign or axis that ncfix knows explains it; or two units would, and it is not sure which.",
+        "Is it the measurement of another machine, are columns exchanged, or are the values in another unit?",
     ),
     "NCF656": Code(
         "the files contradict each other",

@@ -37,6 +37,7 @@ from ncfix.diagnosis.joint_fit import (
 )
 from ncfix.diagnosis.mistakes.mistake import Mistake
 from ncfix.diagnosis.mistakes.search import find, is_a_point_of
+from ncfix.diagnosis.mistakes.units import UNIT_OF_VALUES, usual_units
 from ncfix.diagnosis.next_poses import Proposal, proposed
 from ncfix.diagnosis.noise import (
     NoiseFloor,
@@ -50,6 +51,7 @@ from ncfix.diagnosis.noise import (
 from ncfix.diagnosis.residual_data import ResidualData, residual_data
 from ncfix.diagnosis.residual_patterns import ResidualPattern, clustering, patterns
 from ncfix.diagnosis.selection import (
+    ALIKE,
     Selected,
     aliases,
     findable_sizes,
@@ -383,16 +385,19 @@ def diagnose(
         return _explained(measurements, machine, refused, len(measurements) - 1)
     wrong = find(measurements, machine, refused)
     if wrong is None:
-        checks.sensible(measurements, machine)
+        try:
+            checks.sensible(measurements, machine)
+        except UsageError as refusal:
+            return _in_usual_unit(measurements, machine, refused, refusal)
         return _explained(measurements, machine, refused)
     undone = _explained(wrong.measurements, wrong.machine, refused)
     if not wrong.sure or any(each.candidate.family == CONSTANT_FAMILY for each in undone.findings):
         try:
             checks.sensible(measurements, machine)
             given = _explained(measurements, machine, refused)
-        except UsageError:
+        except UsageError as refusal:
             if undone.gap.given > AS_GOOD * undone.gap.floor:
-                raise
+                return _in_usual_unit(measurements, machine, refused, refusal)
             return _with_mistake(undone, wrong, machine)
         stretched = len(undone.data.y) * float(np.log(wrong.stretch))
         odds = undone.likelihood + stretched - wrong.paid - given.likelihood
@@ -400,6 +405,23 @@ def diagnose(
             return given
         wrong = replace(wrong, odds=odds if odds > 0 else wrong.odds)
     return _with_mistake(undone, wrong, machine)
+
+
+def _in_usual_unit(
+    measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str], refusal: UsageError
+) -> Diagnosis:
+    """Of values that no machine errs by: a diagnosis in the unit in which they would be usual, where that is one only.
+
+    Raises the refusal, or NCF654 that names the units.
+    """
+    units = [] if UNIT_OF_VALUES in refused else usual_units(tuple(measurements), machine)
+    units = [each for each in units if each.odds > units[0].odds - ALIKE]
+    if not units:
+        raise refusal
+    if len(units) > 1:
+        said = "; or ".join(each.title.removeprefix(f"{UNIT_OF_VALUES}: ") for each in units)
+        raise UsageError.of("NCF654", refusal.messages[0].text, hint=f"{said}? In that unit machines err so")
+    return _with_mistake(_explained(units[0].measurements, machine, refused), units[0], machine)
 
 
 def _changes(found: Diagnosis, evidence: Evidence) -> Diagnosis:
@@ -481,16 +503,17 @@ def _selected(scale: Comparison) -> Selected:
 
 def _with_mistake(diagnosis: Diagnosis, wrong: Mistake, given: Machine) -> Diagnosis:
     """The diagnosis with the mistake as its first finding; the machine file that was given is put right."""
-    candidate = Candidate(wrong.name, wrong.title, wrong.axis, "mistake", (), (), remedy="correct the mistake")
+    remedy = wrong.remedy or "correct the mistake"
+    candidate = Candidate(wrong.name, wrong.title, wrong.axis, "mistake", (), (), remedy=remedy)
     size = float(np.sqrt(max(wrong.given_um**2 - diagnosis.gap.given**2, 0.0)))
     p_value = float(np.exp(-max(wrong.odds, 0.0)))
     first = EffectFinding(candidate, wrong.odds, p_value, wrong.aliases, size, (), np.zeros(len(diagnosis.data.y)))
     verdict = (AMBIGUOUS if wrong.aliases else FOUND) if diagnosis.verdict == NOTHING else diagnosis.verdict
-    put_right = wrong.machine if wrong.machine != given else None
+    put_right = diagnosis.machine or (wrong.machine if wrong.machine != given else None)
     return replace(
         diagnosis,
         verdict=verdict,
         findings=(first, *diagnosis.findings),
         mistake=wrong,
-        machine=diagnosis.machine or put_right,
+        machine=None if wrong.torn else put_right,
     )

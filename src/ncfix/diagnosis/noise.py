@@ -439,7 +439,7 @@ def repeat_scatter(data: ResidualData, keep: NDArray[np.bool_]) -> tuple[float, 
 
 
 def states(measurements: Sequence[Measurement]) -> list[int]:
-    """Number of the commanded state of each row; rows of one state follow one another."""
+    """Number of the commanded state of each row; rows of one state follow one another, but in a test of drift."""
     seen: list[int] = []
     number, before = -1, None
     for each in measurements:
@@ -447,7 +447,7 @@ def states(measurements: Sequence[Measurement]) -> list[int]:
         labels = [value for name, value in each.labels.items() if name != "repeat"]
         for i in range(len(each)):
             key = (each.path, *(label[i] for label in labels), *(round(float(each.columns[n][i]), 4) for n in names))
-            number += key != before
+            number += each.stays or key != before
             before = key
             seen.append(number)
     return seen
@@ -462,8 +462,10 @@ def lack_of_fit(noise_floor: NoiseFloor, residual: Array, parameters: float) -> 
     squares = float((residual**2).sum())
     if noise_floor.source == "repeats":
         left = n - parameters - noise_floor.freedom
+        if left <= 0:
+            return None
         ratio = ((squares - noise_floor.squares) / left) / (noise_floor.squares / noise_floor.freedom)
-        return float(fdtrc(left, noise_floor.freedom, ratio)) if left > 0 else None
+        return float(fdtrc(left, noise_floor.freedom, ratio))
     if noise_floor.source == "given":
         return float(chdtrc(max(n - parameters, 1), squares / noise_floor.sigma_um**2))
     return None

@@ -66,6 +66,8 @@ def text(diagnosis: Diagnosis) -> str:
         lines += ["", f"{finding.candidate.name}: {finding.candidate.title}", f"  {why(diagnosis, finding)}"]
         if finding.aliases:
             lines.append(f"  may as well be: {', '.join(finding.aliases)}")
+        if diagnosis.mistake and diagnosis.mistake.remedy and finding is diagnosis.findings[0]:
+            lines.append(f"  {diagnosis.mistake.remedy}")
         lines += [f"  {said}" for said in (constants(finding), odd(finding), carried(diagnosis, finding)) if said]
     if diagnosis.unknown_um:
         lines += ["", rest(diagnosis)]

@@ -250,18 +250,26 @@ def with_alternatives(scale: Comparison, members: Members) -> Selected:
 
 def plainest(scale: Comparison, selected: Selected) -> Selected:
     """With names that consist of fewer errors where they say as much: a backlash in the place of an angular play with
-    one lever, which brings a backlash.
+    one lever, which brings a backlash; and in the place of one that claims what no data show, any alias that does not:
+    of a straightness alone nobody can say that a sag brings it.
     """
+    evidence = scale.evidence
     for name in selected.named:
-        others, least = _less(selected.members, name), selected.odds[name] - ASSUMED * NO_BETTER
+        others, alike = _less(selected.members, name), selected.acting_alike[name]
+        claims = _claims(evidence, selected.members[name].group)
         fewer = {
             each: selected.runners_up[name][each]
-            for each in sorted(selected.acting_alike[name])
-            if _errors(scale.evidence, each) < _errors(scale.evidence, name) and selected.runners_up[name][each] > least
+            for each in sorted(alike)
+            if selected.runners_up[name][each] > selected.odds[name] - ASSUMED * (ALIKE if claims else NO_BETTER)
+            and (
+                not _claims(evidence, evidence.forms[each][0])
+                if claims
+                else _errors(evidence, each) < _errors(evidence, name)
+            )
         }
         if fewer:
             plain = max(fewer, key=lambda each: fewer[each])
-            forms = scale.candidate_odds(others).likeliest(scale.evidence.forms[plain], FORMS)
+            forms = scale.candidate_odds(others).likeliest(evidence.forms[plain], FORMS)
             found = ({**others, plain: form} for form in forms)
             selected = with_alternatives(scale, max(found, key=scale.weight))
     return selected
@@ -270,6 +278,15 @@ def plainest(scale: Comparison, selected: Selected) -> Selected:
 def _errors(evidence: Evidence, name: str) -> set[str]:
     """The errors that a name consists of."""
     return {effect.name for effect in evidence.groups[evidence.forms[name][0]].owner.effects}
+
+
+def _claims(evidence: Evidence, group: int) -> bool:
+    """Whether an effect itself, in this form, consists of errors of which the data show some and others not at all."""
+    form, data = evidence.groups[group], evidence.background.data
+    effects = () if form.owner.grows else form.owner.effects[: form.owner.lead or None]
+    starts = np.cumsum([0, *(effect.basis.size for effect in effects)])
+    own = [e for e, start in zip(effects, starts, strict=False) if form.loading[start : start + e.basis.size].any()]
+    return any(not data.design([effect]).any() for effect in own)
 
 
 def _formed(scale: Comparison, members: Members) -> dict[str, Member]:

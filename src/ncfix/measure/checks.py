@@ -10,10 +10,15 @@ import numpy as np
 from ncfix.diagnostics import ConfigError, Message
 from ncfix.machine import Machine
 from ncfix.machine.axes import COMPONENTS
+from ncfix.machine.plausible import much
 from ncfix.measure.measurement import CENTRE, ENDS, Array, Index, Measurement, component_of, groups
 
 LARGE_MM, LARGE_RAD = 2.0, 0.02
 """Errors of which half the rows exceed this are in another unit."""
+BEYOND_MUCH = 10.0
+"""Times what is much of an error motion of one axis: half the rows of no machine that runs exceed this."""
+SMALL_MM = 1e-4
+"""Errors of one axis that are nowhere larger are in another unit."""
 ROUND_DEG = 1e-6
 FAR = 0.4
 """Of the travel: positions in radians that go so far are no corner of it in degrees."""
@@ -40,7 +45,7 @@ def checked(measurement: Measurement, machine: Machine, lines: Sequence[str] = (
         *_radians(measurement, machine),
         *_lengths_in_another_unit(measurement, machine),
         *_ranges(measurement, machine),
-        *_micrometres(measurement),
+        *_micrometres(measurement, machine),
         *_circles(measurement, machine),
     ]
     return replace(measurement, remarks=(*measurement.remarks, *(_shown(each, lines) for each in remarks)))
@@ -137,8 +142,7 @@ def _repeated(measurement: Measurement, pairs: Sequence[tuple[int, int]], what: 
 
 def _radians(measurement: Measurement, machine: Machine) -> Iterator[Message]:
     for axis in machine.axes:
-        rows = _rows_of(measurement, axis.name)
-        values = _positions(measurement, axis.name)[rows]
+        rows, values = _commanded(measurement, axis.name)
         low, high = (limit / axis.unit for limit in axis.range)
         if axis.rotary and high - low > 45 and _looks_like_radians(values, low, high):
             spread = f"{values.min():g} ... {values.max():g}"
@@ -146,16 +150,14 @@ def _radians(measurement: Measurement, machine: Machine) -> Iterator[Message]:
             yield Message("NCF614", text, measurement.place(int(rows[np.abs(values).argmax()])))
 
 
-def _positions(measurement: Measurement, axis: str) -> Array:
-    """Of an axis, or of whichever is measured directly in a row."""
-    return measurement.column("position" if measurement.kind == "axis" else axis)
-
-
-def _rows_of(measurement: Measurement, axis: str) -> Index:
-    """Where a position of this axis is given."""
+def _commanded(measurement: Measurement, axis: str) -> tuple[Index, Array]:
+    """Rows and positions of an axis: of whichever is measured directly in a row, and of both ends of a length."""
     if measurement.kind == "axis":
-        return np.flatnonzero(np.array(measurement.labels["axis"]) == axis)
-    return np.arange(len(measurement) if axis in measurement.columns else 0)
+        rows = np.flatnonzero(np.array(measurement.labels["axis"]) == axis)
+        return rows, measurement.column("position")[rows]
+    names = [name for name in (axis, f"a{axis.lower()}", f"b{axis.lower()}") if name in measurement.columns]
+    values = [measurement.columns[name] for name in names if name == axis or name in ENDS]
+    return np.tile(np.arange(len(measurement)), len(values)), np.concatenate([np.zeros(0), *values])
 
 
 def _looks_like_radians(values: Array, low: float, high: float) -> bool:
@@ -174,8 +176,7 @@ def _looks_like_radians(values: Array, low: float, high: float) -> bool:
 def _lengths_in_another_unit(measurement: Measurement, machine: Machine) -> Iterator[Message]:
     """A word on positions that are a corner of the travel, and in another unit would be most of it."""
     for axis in machine.axes:
-        rows = _rows_of(measurement, axis.name)
-        values = _positions(measurement, axis.name)[rows]
+        rows, values = _commanded(measurement, axis.name)
         low, high = axis.range
         if axis.rotary or not np.isfinite(high - low) or len(np.unique(values)) < 3:
             continue
@@ -190,8 +191,8 @@ def _lengths_in_another_unit(measurement: Measurement, machine: Machine) -> Iter
 
 def _ranges(measurement: Measurement, machine: Machine) -> Iterator[Message]:
     for axis in machine.axes:
-        rows = _rows_of(measurement, axis.name)
-        values = _positions(measurement, axis.name)[rows] * axis.unit
+        rows, values = _commanded(measurement, axis.name)
+        values = values * axis.unit
         outside = np.flatnonzero((values < axis.range[0] - BEYOND) | (values > axis.range[1] + BEYOND))
         if outside.size:
             low, high = (limit / axis.unit for limit in axis.range)
@@ -202,15 +203,22 @@ def _ranges(measurement: Measurement, machine: Machine) -> Iterator[Message]:
             yield Message("NCF615", text, measurement.place(int(rows[outside[0]])), hint)
 
 
-def _micrometres(measurement: Measurement) -> Iterator[Message]:
+def _micrometres(measurement: Measurement, machine: Machine) -> Iterator[Message]:
+    """A word on errors that no machine has: of the tip, where an axis may lie elsewhere, and of one axis itself."""
     for name, rows, values in _errors(measurement):
         turns = name[0] == "r" or name[1] in "ABC"
         limit, unit = (LARGE_RAD, "rad") if turns else (LARGE_MM, "mm")
-        size = float(np.median(np.abs(values[rows])))
+        if measurement.kind == "axis":
+            limit = BEYOND_MUCH * much(machine, name)
+        size, most = float(np.median(np.abs(values[rows]))), float(np.abs(values[rows]).max())
+        place = measurement.place(int(rows[0]))
         if size > limit:
             text = f"{name} is {size:g} {unit} in the median: errors are given in {unit}"
             hint = "are they in degrees, in seconds of arc, or in mrad?" if turns else "divide by 1000?"
-            yield Message("NCF616", text, measurement.place(int(rows[0])), hint)
+            yield Message("NCF616", text, place, hint)
+        elif measurement.kind == "axis" and not turns and 0 < most < SMALL_MM:
+            text = f"{name} is {1e3 * most:.2g} um at most: no laser tells so little"
+            yield Message("NCF616", text, place, "are the values in metres or inches, or those of a .rtl in mm?")
 
 
 def _circles(measurement: Measurement, machine: Machine) -> Iterator[Message]:

@@ -74,8 +74,9 @@ CODES = {
         "The machine cannot have been there: swapped columns, another machine, or a range that is wrong.",
     ),
     "NCF616": Code(
-        "measured errors look like micrometres",
-        "The values are larger than a machine tool's errors in mm can be. They are given in mm (rotations in rad).",
+        "measured errors look like another unit",
+        "The values are larger than a machine tool's errors in mm can be, or smaller than a laser tells. They are "
+        "given in mm (rotations in rad).",
     ),
     "NCF617": Code(
         "a mistake in a measurement file",
@@ -127,6 +128,14 @@ CODES = {
         "The commanded tool tip is not at the length of the bar from the stated centre. The direction of the bar is "
         "worked out from both, so errors would come out too large or too small, though the fit is as good as ever.",
         "Give `tool_length`, and the centre where it is in the workpiece frame: X Y Z of the tip, not of the axes.",
+    ),
+    "NCF626": Code(
+        "positioning of an axis that goes against its base axis",
+        "The body of a table axis goes towards minus as its number grows. Its positioning error (EXX of X) is that of "
+        "the body, along the base axis: target minus actual. A laser says actual minus target. With the wrong sign a "
+        "correction doubles the error.",
+        "Write `# sense: axis` above deviations that are actual minus target, as the number of the axis counts: they "
+        "are turned then. `# sense: body` says that they are turned already.",
     ),
     "NCF630": Code(
         "too few rows for the unknowns",

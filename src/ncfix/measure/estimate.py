@@ -24,7 +24,7 @@ from ncfix.measure.instruments import observe
 from ncfix.measure.least_squares import Solution, gauss_newton, solve
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.observation import Mask, Observation
-from ncfix.measure.selection import Selection
+from ncfix.measure.selection import LOCATIONS, Selection
 from ncfix.values import frozen
 
 STEPS = 25
@@ -288,7 +288,8 @@ def _enough(problem: Problem) -> None:
     k = int(np.linalg.matrix_rank(nuisance)) if nuisance.shape[1] else 0
     if m <= p + k:
         text = f"{m} values for {p} coefficients and {k} unknowns of the set-up"
-        raise UsageError.of("NCF630", text, hint="measure more poses, or estimate fewer effects: --effects")
+        hint = f'measure more poses, or estimate fewer effects: --effects "{LOCATIONS}" asks where axes lie'
+        raise UsageError.of("NCF630", text, hint=hint)
 
 
 def _first_scale(problem: Problem) -> float:

@@ -22,8 +22,9 @@ import numpy as np
 
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.machine import Axis, Machine
+from ncfix.machine.axes import COMPONENTS
 from ncfix.measure import checks
-from ncfix.measure.measurement import Measurement
+from ncfix.measure.measurement import Measurement, component_of
 from ncfix.plugins import called, registry
 from ncfix.values import frozen, mutable
 
@@ -44,8 +45,6 @@ OTHER = re.compile(r"straight|square|angular|flatness|diagonal|(?<![a-z])(?:pitc
 ANOTHER_ERROR = re.compile(r"\.rt[a-km-z]")
 """Endings of files of angles (.rta), straightness (.rts) and others, which have the same sections as `.rtl`."""
 MICROMETRE = 1e-3
-SMALL = 1e-4
-"""mm; no run of an axis has such small deviations."""
 
 Reader = Callable[[str, str], Measurement | None]
 """Makes a measurement of a text and its path, or None if the text is not of its kind."""
@@ -92,43 +91,51 @@ def recognised(text: str, machine: Machine, path: str) -> Measurement | None:
     if found is None:
         return None
     if reader is renishaw:
-        found = _of_bodies(found, machine)
+        found = of_bodies(found, machine)
     elif reader is not None:
-        found = replace(found, remarks=(*found.remarks, *_backwards(found, machine)))
+        hint = "if they count as the axis does, their sign is wrong"
+        found = replace(found, remarks=(*found.remarks, *backwards(found, machine, "NCF618", hint)))
     return checks.checked(found, machine)
 
 
-def _of_bodies(measurement: Measurement, machine: Machine) -> Measurement:
-    """Deviations count the way the number of the axis grows, errors along the base axes: a table axis goes against."""
+def of_bodies(measurement: Measurement, machine: Machine) -> Measurement:
+    """Positioning deviations that count the way the number of the axis grows, as errors along the base axes: a table
+    axis goes against.
+
+    Raises `ConfigError` NCF618 of an axis that is slanted against its error axis.
+    """
     factor = np.ones(len(measurement))
-    for axis in _measured(measurement, machine):
+    for axis, rows in _positioned(measurement, machine):
         along = _along(axis)
         if abs(along) < 1 - SLANTED:
             text = f"{axis.name} does not move along its error axis: what it is off is no E{axis.name}{axis.name} alone"
             raise ConfigError.of("NCF618", text, Place(measurement.path), "give the errors as kind axis")
-        factor[np.array(measurement.labels["axis"]) == axis.name] = np.sign(along)
+        factor[rows] = np.sign(along)
     return measurement.with_columns({"value": factor * measurement.columns["value"]})
 
 
-def _backwards(measurement: Measurement, machine: Machine) -> Iterator[Message]:
-    """A word on axes whose bodies go the other way than their numbers: of them nobody says how a table counts."""
-    for axis in _measured(measurement, machine):
+def backwards(measurement: Measurement, machine: Machine, code: str, hint: str) -> Iterator[Message]:
+    """A word on positioning of axes whose bodies go against their numbers: nobody says how a table counts."""
+    for axis, rows in _positioned(measurement, machine):
         if _along(axis) < 0:
-            text = f"errors of {axis.name} are taken along the base axes, against which it moves as its number grows"
-            yield Message(
-                "NCF618", text, Place(measurement.path), f"if they count as {axis.name} does, their sign is wrong"
-            )
+            own = f"E{axis.name}{axis.name}"
+            text = f"{own} is taken along the base axis, against which {axis.name} moves as its number grows"
+            yield Message(code, text, measurement.place(rows[0]), hint)
 
 
-def _measured(measurement: Measurement, machine: Machine) -> list[Axis]:
-    """The linear axes of which there are readings."""
-    named = set(measurement.labels.get("axis", ()))
-    return [axis for axis in machine.axes if axis.name in named and axis.name in LINEAR and not axis.rotary]
+def _positioned(measurement: Measurement, machine: Machine) -> Iterator[tuple[Axis, list[int]]]:
+    """The axes X Y Z A B C whose positioning was read, with the rows of that."""
+    pairs = list(zip(measurement.labels["axis"], measurement.labels["component"], strict=True))
+    for axis in machine.axes:
+        own = f"E{axis.name}{axis.name}"
+        rows = [row for row, pair in enumerate(pairs) if pair[0] == axis.name and component_of(*pair) == own]
+        if rows and axis.name in COMPONENTS and axis.rotary == (axis.name not in LINEAR):
+            yield axis, rows
 
 
 def _along(axis: Axis) -> float:
     """The part of its motion that is along the error axis of its own positioning error."""
-    return float(np.asarray(axis.error_axes[LINEAR.index(axis.name)]) @ np.asarray(axis.direction))
+    return float(np.asarray(axis.error_axes[COMPONENTS.index(axis.name) % 3]) @ np.asarray(axis.direction))
 
 
 def _by_plugin(text: str, path: str) -> Measurement | None:
@@ -164,10 +171,6 @@ def renishaw(text: str, path: str) -> Measurement:
         came = [*ways[:1], *(back or on for back, on in pairwise([*ways, 0.0]))] if len(ways) else [0.0]
         for each, place, way in zip(readings, places, came, strict=True):
             rows.add(f"E{axis}{axis}", place, each.value, each.line, each.run, int(way))
-    largest = max(map(abs, rows.value), default=0.0)
-    if 0 < largest < SMALL:
-        said = f"no deviation is above {largest / MICROMETRE:g} um: they are read as micrometres"
-        rows.remarks.append(Message("NCF618", said, Place(path, rows.line[0]), "are they in mm?"))
     return rows.measurement("line", "Renishaw")
 
 

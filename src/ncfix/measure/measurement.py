@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +80,7 @@ KINDS = {
             ("value",),
             optional=("run", "direction"),
             labels=("axis", "component"),
-            headers=("point", "setup"),
+            headers=("point", "setup", "sense"),
         ),
         MeasurementKind(
             "points",
@@ -106,6 +107,7 @@ CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
         "axis": ("line", "none"),
         "length": ("known", "unknown", "none"),
     },
+    "sense": {"axis": ("body", "axis")},
     "frame": {"tcp": ("workpiece", "base"), "tcp6": ("workpiece", "base"), "points": ("instrument", "base")},
     "carried_by": {"points": ("tool", "spindle", "workpiece")},
 }
@@ -167,6 +169,14 @@ class Measurement:
     def sets(self) -> tuple[str, ...]:
         """The set of each row: rows of one set share their unknown set-up."""
         return self.labels.get("set", ("1",) * len(self))
+
+    @cached_property
+    def stays(self) -> bool:
+        """Whether nothing but time and warmth changes, as in a test of drift: its rows are no repeats."""
+        labels = [texts for name, texts in self.labels.items() if name not in ("set", "repeat")]
+        held = all(len(set(texts)) < 2 for texts in labels)
+        changing = [n for n, each in self.columns.items() if n not in (*self.measured, "run") and np.ptp(each) > 0]
+        return held and bool(changing) and all(name == "time_s" or name.startswith("temp_") for name in changing)
 
     def column(self, name: str, default: float = 0.0) -> Array:
         """A column of numbers (n,), in the units of the file, or the default in every row."""

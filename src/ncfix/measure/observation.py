@@ -204,7 +204,11 @@ def repeatability(
 
 
 def _states(measurement: Measurement) -> list[str]:
-    """The state of each row, as text: what repeats of it share; none where nothing but readings was noted."""
+    """The state of each row, as text: what repeats of it share; none where nothing but readings was noted, or of a test
+    of drift.
+    """
+    if measurement.stays:
+        return []
     labels = [value for name, value in measurement.labels.items() if name != "repeat"]
     between = (*measurement.measured, "time_s", "run")
     names = [name for name in measurement.columns if name not in between and not name.startswith("temp_")]

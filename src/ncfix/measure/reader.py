@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import field
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -27,7 +27,7 @@ SHOWN = 25
 VERSION = 1
 NUMBERS = {"noise_um": 1, "noise_urad": 1, "point": 3}
 """Header lines that are so many numbers."""
-ONCE = ("ncfix-measurement", "kind", "noise_um", "noise_urad", "point", "frame", "setup", "carried_by")
+ONCE = ("ncfix-measurement", "kind", "noise_um", "noise_urad", "point", "frame", "setup", "sense", "carried_by")
 """Header lines of which there can only be one."""
 NAMED = {"distance": (2, 2), "target": (1, 3)}
 """Header lines that are names and then numbers: `distance: 1 2 304.6686 0.0012`."""
@@ -60,7 +60,20 @@ def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bo
         raise ConfigError.of("NCF600", said, Place(path), hint or "save it as CSV")
     lines = MeasurementLines(path, text.splitlines(), not text.endswith(("\n", "\r")))
     measurement = _measurement(lines, machine, plan)
-    return checks.checked(measurement, machine, lines.lines)
+    checked = checks.checked(measurement, machine, lines.lines)
+    return _sensed(checked, machine) if measurement.kind == "axis" else checked
+
+
+def _sensed(measurement: Measurement, machine: Machine) -> Measurement:
+    """Positioning in the sense of bodies, whatever the head says; where it says nothing of a table axis, a remark."""
+    if "value" not in measurement.columns:
+        return measurement.with_header("sense", "body")  # a plan, which is filled in so
+    if measurement.header("sense") == "axis":
+        return foreign.of_bodies(measurement, machine).with_header("sense", "body")
+    if any(key == "sense" for key, _ in measurement.headers):
+        return measurement
+    remarks = foreign.backwards(measurement, machine, "NCF626", "a line `# sense: axis` or `# sense: body` says which")
+    return replace(measurement, remarks=(*measurement.remarks, *remarks))
 
 
 def _measurement(text: MeasurementLines, machine: Machine, plan: bool) -> Measurement:

@@ -27,7 +27,8 @@ from ncfix.machine.piecewise import Truncated
 from ncfix.toml_text import did_you_mean
 from ncfix.values import frozen
 
-ALL = "all"
+ALL, LOCATIONS = "all", "E?0?"
+"""Patterns of all effects, and of where axes lie."""
 TERM = re.compile(r"([XYZABC][A-Z])(\d|b)(?:-(\d))?")
 RADIAN = 180 / np.pi
 """The file's unit of a rotary axis is the degree: this scale makes u radians."""
@@ -94,7 +95,8 @@ def select(
     """The effects that are meant by a list such as `EC0Y,E?X,EZZ`, by `all`, or by the name of a model;
     names of physical effects (`ncfix.machine.effects`) may stand in the list.
 
-    Nothing given means those of the machine; a machine without effects gets all of them. `reference` is the point to
+    Nothing given means those of the machine; a machine without effects gets all of them, an arm where its joints lie:
+    measurements of arms hardly tell more, and what is missing then is found by its name. `reference` is the point to
     which new effects refer; with `knots` the new error motions of linear axes are piecewise, with so many knots.
     Raises `UsageError` NCF635.
     """
@@ -103,7 +105,7 @@ def select(
         return _with_new((), (), MODELS[wanted].effects(machine))
     if wanted is None and machine.effects:
         return Selection(machine.effects, (True,) * len(machine.effects))
-    meant = _Wanted.of(machine, wanted or ALL)
+    meant = _Wanted.of(machine, wanted or (LOCATIONS if is_arm(machine.axes) else ALL))
     present, there = {effect.name for effect in machine.effects}, {form(effect) for effect in machine.effects}
     new = [effect for effect in meant.physical if form(effect) not in there]
     new += [effect for name in meant.patterns for effect in _new(machine, name, present, point, knots)]

@@ -31,7 +31,7 @@ from ncfix.measure.measurement import Array
 
 POWERS = (0, 1, 2, 3, 4)
 FOOT = 30.0
-"""mm: how far the point about which a sagging slide turns lies from the reference point stated."""
+"""mm: how far the point about which a nodding slide turns lies from the reference point stated."""
 TILTED = 0.2
 """How much more or less than the slope a slide tilts, as a share: it is as long as its carriages are apart."""
 LOAD: dict[str, Any] = {"times": "load_kg", "times_center": 0.0, "times_scale": 100.0}
@@ -79,35 +79,33 @@ def _beam(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
 def _deflected(
     measured: MeasuredRange, axis: Axis, own: int, forms: tuple[Array, ...]
 ) -> tuple[tuple[Effect, ...], tuple[Array, ...]]:
-    """Shift across, its slope as a tilt, and the small shifts of a tilt about another point."""
+    """Shift across and its slope as a tilt, either way. That the slide turns about a foot elsewhere shifts it by much
+    less: with shifts of their own, two curves that have nothing to do with a sag would be taken for one.
+    """
     span = measured.scaled(axis)
+    basis, none = Polynomial(degree=POWERS), np.zeros((2 * len(POWERS), 0))
     effects: list[Effect] = []
-    parts: list[list[Array]] = []
-    basis = Polynomial(degree=POWERS)
+    signs: list[float] = []
     for way in across(axis):
         turn = ({0, 1, 2} - {own, way}).pop()
         pair = np.zeros((2, 3))
         pair[0, :] = np.asarray(axis.error_axes[own]) * (np.asarray(axis.direction) @ np.asarray(axis.error_axes[own]))
         pair[1, :] = axis.error_axes[way]
-        sign = float(np.cross(pair[0], pair[1]) @ np.asarray(axis.error_axes[turn]))
-        effects += [Effect(f"E{LETTERS[way]}{axis.name}", (), basis, **span)]
-        effects += [Effect(f"E{TURNS[turn]}{axis.name}", (), basis, **span)]
-        effects += [Effect(f"E{LETTERS[k]}{axis.name}", (), basis, **span) for k in (own, way)]
-        parts.append([_sloped(form, sign / span["scale"]) for form in forms])
-    zeros = np.zeros((4 * len(POWERS), 0))
-    loadings = [stacked(each, zeros) for each in parts[0]] + [stacked(zeros, each) for each in parts[1]]
-    return zero(effects), tuple(loadings)
+        signs.append(float(np.cross(pair[0], pair[1]) @ np.asarray(axis.error_axes[turn])))
+        effects += [Effect(f"E{letter}{axis.name}", (), basis, **span) for letter in (LETTERS[way], TURNS[turn])]
+    first, second = ([_sloped(form, sign / span["scale"]) for form in forms] for sign in signs)
+    return zero(effects), (*(stacked(each, none) for each in first), *(stacked(none, each) for each in second))
 
 
 def _sloped(form: Array, factor: float) -> Array:
-    """The loading of [f, f' or nearly, shifts of a foot elsewhere] for f with these columns of powers.
+    """The loading of [f, f' or nearly] for f with these columns of powers.
 
-    The shifts are without mean and slope, which are constants of the machine: where an axis lies, and its gain.
+    The shift is without mean and slope, which are constants of the machine: where an axis lies, and its gain.
     """
     slope = np.zeros_like(form)
     slope[:-1] = factor * form[1:] * np.arange(1, len(form))[:, None]
-    both = np.block([[_bent(form), np.zeros_like(form)], [slope, TILTED * slope]])
-    return stacked(both, _bent(FOOT * slope), _bent(FOOT * slope))
+    both: Array = np.block([[_bent(form), np.zeros_like(form)], [slope, TILTED * slope]])
+    return both
 
 
 def _bent(form: Array) -> Array:

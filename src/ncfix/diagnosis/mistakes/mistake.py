@@ -23,6 +23,9 @@ class Mistake:
     odds, paid           log odds against the file as given, after what the mistake pays
     sure                 it reaches the noise: no names do better
     gained               log odds before it pays, where it is sure though the noise is not reached
+    torn                 a mistake that explains the data as well is in the data, and this in the machine file, or the
+                         other way round: no file is right for both
+    remedy               what to do about it, where its title does not say so
     """
 
     name: str
@@ -42,6 +45,8 @@ class Mistake:
     paid: float = 0.0
     sure: bool = False
     gained: float | None = None
+    torn: bool = False
+    remedy: str = ""
 
 
 def undone_by_columns(

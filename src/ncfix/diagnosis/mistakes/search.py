@@ -31,7 +31,7 @@ from ncfix.diagnosis.residual_data import (
 )
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine
-from ncfix.measure.measurement import Measurement
+from ncfix.measure.measurement import Measurement, component_of
 
 SUSPECT = 1.15
 """Times the noise from which on a mistake is looked for."""
@@ -52,6 +52,7 @@ PLAUSIBLE_UM, DECADE = 3.0, float(np.log(10.0))
 TYPED = 5.0
 """Log odds beforehand for a mistake that the file itself looks like."""
 TINY_UM = 1e-6
+TORN = "the machine file is wrong, or the readings are: no file is written until it is known which"
 ALIKE = 3.0
 """Log odds (20 to 1) within which another mistake explains the data as well."""
 FIRST_SIGHT = 5.0
@@ -90,7 +91,24 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     near = [each for each in alike if each.odds > simplest.odds - ALIKE and each is not simplest]
     aliases = (*dict.fromkeys(each.name for each in near if each.name != simplest.name), *simplest.aliases)
     sure = simplest.odds > NAMES_COST and (simplest.gained is not None or _reaches_noise(simplest, now))
-    return replace(simplest, given_um=standing * float(np.sqrt(components)), aliases=aliases, sure=sure)
+    torn = len({each.machine == machine for each in (simplest, *near)}) > 1
+    given_um = standing * float(np.sqrt(components))
+    remedy = f"{TORN}{_sense(measurements)}" if torn else simplest.remedy
+    return replace(simplest, given_um=given_um, aliases=aliases, sure=sure, torn=torn, remedy=remedy)
+
+
+def _sense(measurements: Sequence[Measurement]) -> str:
+    """How the sign of a laser's deviations is meant, where some were given."""
+    read = {
+        component
+        for each in measurements
+        if each.kind == "axis"
+        for axis, name in zip(each.labels["axis"], each.labels["component"], strict=True)
+        if (component := component_of(axis, name)) and component[1] == component[2]
+    }
+    if not read:
+        return ""
+    return f"; {', '.join(sorted(read))} is actual minus target of the body, and a table goes against its numbers"
 
 
 def _judged(

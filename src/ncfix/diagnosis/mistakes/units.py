@@ -4,33 +4,91 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ncfix.diagnosis.mistakes.mistake import Mistake, times, undone_by_columns
+from ncfix.diagnosis.mistakes.mistake import Mistake, times
+from ncfix.diagnosis.residual_data import misfit
 from ncfix.machine import Effect, Machine
-from ncfix.measure.measurement import Measurement
+from ncfix.machine.plausible import times_a_machining_centre
+from ncfix.measure.measurement import TURNS, Measurement, component_of
 
+UNIT_OF_VALUES = "unit of values"
 LARGE_RAD = 2e-4
 """An angle above this may have been typed in degrees."""
 TURN_RAD = 6.6
 INCH = 25.4
+TINY = 1e-9
 LENGTHS, DEVIATIONS = ("dx", "dy", "dz", "value"), ("tcp", "tcp6", "axis")
 """Columns of measured deviations in mm, and the kinds of files that have them."""
 READINGS = ("x", "y", "z", "length")
 """Columns in mm of what is no deviation: where targets are, and how long a gauge is. Those of probes are positions."""
+UNITS_OF_LENGTH = {"": 1.0, "um": 1e-3, "m": 1e3, "inch": INCH, "thousandths of an inch": INCH / 1e3}
+UNITS_OF_ANGLE = {"": 1.0, "urad": 1e-6, "seconds of arc": np.pi / 648000, "mrad": 1e-3, "degrees": np.pi / 180}
+"""In what values may be given instead of mm and rad, and mm or rad per that."""
+USUAL_UM, USUAL_NOISE_UM, SPREAD = 5.0, 1.0, float(np.log(5.0))
+"""What machines have that a file lacks, rms, and noise of a value; and the spread of the logarithms of both."""
+RARE = {"thousandths of an inch": float(np.log(100.0))}
+"""Log odds beforehand against a unit."""
+
+
+def usual_units(measurements: tuple[Measurement, ...], machine: Machine) -> list[Mistake]:
+    """Of values that are far larger than a machine's errors: the units in which both what the machine file leaves and
+    the noise would be usual ones, likeliest first, with the log odds for each. Nothing else is known of such a file.
+    """
+    given, size = _usual(measurements, machine)
+    offered = [*units_of_values(measurements, machine), *units_of_one_file(measurements, machine)]
+    found = []
+    for each in [each for each in offered if each.name == UNIT_OF_VALUES]:
+        usual, _ = _usual(each.measurements, machine)
+        odds = usual - given - sum(less for unit, less in RARE.items() if unit in each.title)
+        found.append(replace(each, odds=odds, sure=True, given_um=size))
+    return sorted([each for each in found if each.odds > 0], key=lambda each: -each.odds)
+
+
+def _usual(measurements: tuple[Measurement, ...], machine: Machine) -> tuple[float, float]:
+    """How usual is what is left of these values, and the noise of files whose repeats tell it: log likelihood; and how
+    much is left, um rms.
+    """
+    now, large = misfit(measurements, machine), times_a_machining_centre(machine)
+    noise = [float(np.median(each.um * each.sigma)) for each in now.problem.observations if each.noise_known]
+    unusual = np.log(np.maximum([now.free / USUAL_UM, *(each / USUAL_NOISE_UM for each in noise)], TINY) / large)
+    return -0.5 * float(((unusual / SPREAD) ** 2).sum()), now.free
 
 
 def units_of_values(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Measured values in another unit than mm."""
-    names = (*LENGTHS, *READINGS)
-    values = sum(len(each) * len(each.measured) for each in measurements)
-    in_mm = sum(len(each) * sum(name in names for name in each.measured) for each in measurements)
-    share = in_mm / max(values, 1)
-    for unit, factor in (("um", 1e-3), ("m", 1e3), ("inch", INCH)) if in_mm else ():
-        title = f"unit of values: the measured values are in {unit}, not in mm"
-        columns = {name: (name, factor) for name in names}
-        yield undone_by_columns("unit of values", title, machine, measurements, columns, factor**share)
+    """Measured values in another unit than mm and rad."""
+    turns = [_turns(each) for each in measurements]
+    parts = [part for each in turns for part in each.values()]
+    angles = sum(int(part.sum()) for part in parts)
+    lengths = sum(map(len, parts)) - angles
+    for of_length, of_angle in product(UNITS_OF_LENGTH, UNITS_OF_ANGLE):
+        factors, named = (UNITS_OF_LENGTH[of_length], UNITS_OF_ANGLE[of_angle]), [of_length, of_angle]
+        spare = (of_length and not lengths) or (of_angle and not angles)
+        if spare or not any(named) or (all(named) and of_length != "um"):
+            continue
+        changed = tuple(
+            each.with_columns({name: np.where(part, *factors[::-1]) * each.columns[name] for name, part in own.items()})
+            for each, own in zip(measurements, turns, strict=True)
+        )
+        said = " and ".join(filter(None, named))
+        title = f"unit of values: the measured values are in {said}, not in {'mm' if of_length else 'rad'}"
+        stretch = np.exp(np.log(factors) @ (lengths, angles) / (lengths + angles))
+        by = " and ".join(f"{factor:.4g}" for factor in factors if factor != 1)
+        remedy = f"multiply them by {by} in the file, and measure nothing anew"
+        yield Mistake(UNIT_OF_VALUES, title, "", machine, changed, stretch=float(stretch), remedy=remedy)
+
+
+def _turns(measurement: Measurement) -> dict[str, NDArray[np.bool_]]:
+    """The measured columns that have a unit, and where in each an angle was measured."""
+    found = {name: np.zeros(len(measurement), dtype=bool) for name in (*LENGTHS, *READINGS)}
+    found |= {name: np.ones(len(measurement), dtype=bool) for name in TURNS}
+    if measurement.kind == "axis":
+        pairs = zip(measurement.labels["axis"], measurement.labels["component"], strict=True)
+        found["value"] = np.array([(component_of(*pair) or "EXX")[1] in "ABC" for pair in pairs], dtype=bool)
+    return {name: turned for name, turned in found.items() if name in measurement.measured}
 
 
 def units_of_tools(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
