@@ -14,7 +14,7 @@ from . import designs
 from .designs import Design
 
 FINAL_RANGE = 2**40
-_SALT = "hidden effects, final run, 10"
+_SALT = "hidden effects, final run, 11"
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,7 @@ from ncfix.diagnosis.joint_fit import (
 )
 from ncfix.diagnosis.mistakes.mistake import Mistake
 from ncfix.diagnosis.mistakes.search import find, is_a_point_of
-from ncfix.diagnosis.mistakes.units import UNIT_OF_VALUES, usual_units
+from ncfix.diagnosis.mistakes.units import in_usual_unit
 from ncfix.diagnosis.next_poses import Proposal, proposed
 from ncfix.diagnosis.noise import (
     NoiseFloor,
@@ -51,7 +51,6 @@ from ncfix.diagnosis.noise import (
 from ncfix.diagnosis.residual_data import ResidualData, residual_data
 from ncfix.diagnosis.residual_patterns import ResidualPattern, clustering, patterns
 from ncfix.diagnosis.selection import (
-    ALIKE,
     Selected,
     aliases,
     findable_sizes,
@@ -383,21 +382,18 @@ def diagnose(
         if len(measurements) < 2:
             raise UsageError.of("NCF650", "one file: what changed since takes one of each date")
         return _explained(measurements, machine, refused, len(measurements) - 1)
-    wrong = find(measurements, machine, refused)
+    wrong = find(measurements, machine, refused) or in_usual_unit(measurements, machine, refused)
     if wrong is None:
-        try:
-            checks.sensible(measurements, machine)
-        except UsageError as refusal:
-            return _in_usual_unit(measurements, machine, refused, refusal)
         return _explained(measurements, machine, refused)
     undone = _explained(wrong.measurements, wrong.machine, refused)
     if not wrong.sure or any(each.candidate.family == CONSTANT_FAMILY for each in undone.findings):
         try:
             checks.sensible(measurements, machine)
             given = _explained(measurements, machine, refused)
-        except UsageError as refusal:
+        except UsageError:
             if undone.gap.given > AS_GOOD * undone.gap.floor:
-                return _in_usual_unit(measurements, machine, refused, refusal)
+                wrong = in_usual_unit(measurements, machine, refused) or wrong
+                undone = _explained(wrong.measurements, machine, refused)
             return _with_mistake(undone, wrong, machine)
         stretched = len(undone.data.y) * float(np.log(wrong.stretch))
         odds = undone.likelihood + stretched - wrong.paid - given.likelihood
@@ -405,23 +401,6 @@ def diagnose(
             return given
         wrong = replace(wrong, odds=odds if odds > 0 else wrong.odds)
     return _with_mistake(undone, wrong, machine)
-
-
-def _in_usual_unit(
-    measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str], refusal: UsageError
-) -> Diagnosis:
-    """Of values that no machine errs by: a diagnosis in the unit in which they would be usual, where that is one only.
-
-    Raises the refusal, or NCF654 that names the units.
-    """
-    units = [] if UNIT_OF_VALUES in refused else usual_units(tuple(measurements), machine)
-    units = [each for each in units if each.odds > units[0].odds - ALIKE]
-    if not units:
-        raise refusal
-    if len(units) > 1:
-        said = "; or ".join(each.title.removeprefix(f"{UNIT_OF_VALUES}: ") for each in units)
-        raise UsageError.of("NCF654", refusal.messages[0].text, hint=f"{said}? In that unit machines err so")
-    return _with_mistake(_explained(units[0].measurements, machine, refused), units[0], machine)
 
 
 def _changes(found: Diagnosis, evidence: Evidence) -> Diagnosis:

@@ -9,8 +9,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.diagnosis.checks import sensible
 from ncfix.diagnosis.mistakes.mistake import Mistake, times
 from ncfix.diagnosis.residual_data import misfit
+from ncfix.diagnosis.selection import ALIKE
+from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.plausible import times_a_machining_centre
 from ncfix.measure.measurement import TURNS, Measurement, component_of
@@ -34,9 +37,29 @@ RARE = {"thousandths of an inch": float(np.log(100.0))}
 """Log odds beforehand against a unit."""
 
 
-def usual_units(measurements: tuple[Measurement, ...], machine: Machine) -> list[Mistake]:
-    """Of values that are far larger than a machine's errors: the units in which both what the machine file leaves and
-    the noise would be usual ones, likeliest first, with the log odds for each. Nothing else is known of such a file.
+def in_usual_unit(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str]) -> Mistake | None:
+    """Of values that no machine errs by: the unit in which they would be usual; None where they are as machines err.
+
+    Raises `UsageError` NCF654 where there is no such unit, or more than one, which are named.
+    """
+    try:
+        sensible(measurements, machine)
+    except UsageError as refusal:
+        found = [] if UNIT_OF_VALUES in refused else _usual_units(tuple(measurements), machine)
+        found = [each for each in found if each.odds > found[0].odds - ALIKE]
+        if not found:
+            raise
+        if len(found) > 1:
+            said = "; or ".join(each.title.removeprefix(f"{UNIT_OF_VALUES}: ") for each in found)
+            hint = f"{said}? In such a unit machines err so"
+            raise UsageError.of("NCF654", refusal.messages[0].text, hint=hint) from refusal
+        return found[0]
+    return None
+
+
+def _usual_units(measurements: tuple[Measurement, ...], machine: Machine) -> list[Mistake]:
+    """The units in which both what the machine file leaves and the noise would be usual ones, likeliest first, with the
+    log odds for each. Nothing else is known of such a file.
     """
     given, size = _usual(measurements, machine)
     offered = [*units_of_values(measurements, machine), *units_of_one_file(measurements, machine)]
