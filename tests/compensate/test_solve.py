@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
 from ncfix.control.moves import MotionKind
-from ncfix.control.setup import Setup
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Machine, load
 from ncfix.text.reader import read
 from ncfix.writer.pieces import BEYOND_TRAVEL, PINNED
@@ -59,3 +60,20 @@ def test_what_leads_to_an_arc_that_cannot_be_written_is_left_as_it_was(root: Pat
     fixed = fix_program(read(text, "circle", "fanuc"), machine, setup, FixOptions(tolerance_um=1.0))
     assert [(each.line, PINNED in each.reason) for each in fixed.report.refused] == [(3, True), (5, False)]
     assert b"G1 X20. Y10.\nG93\nG2 X20. Y10. I105. J0.\n" in fixed.text
+
+
+NO_HOLE_YET = "G21 G17 G90 G94 G98 G54\nT1 M6\nG0 X0. Y0.\nG43 H1 Z25.\nG81 Z-3. R1. F100. {}0\n"
+CALLED = {
+    "haas": NO_HOLE_YET.format("L") + "M97 P1000 L2\nG80\nM30\nN1000 X10. Y10.\nG91 X5. L3\nG90\nM99\n",
+    "fanuc": NO_HOLE_YET.format("K") + "M98 P1000 L2\nG80\nM30\nO1000\nX10. Y10.\nG91 X5. K3\nG90\nM99\n",
+}
+
+
+@pytest.mark.parametrize("dialect", CALLED)
+def test_attempts_that_refuse_and_correct_by_turns_come_to_an_end(dialect: str, machine: Machine) -> None:
+    """The level and the depth that the second call finds are those that the first one left, corrected or not."""
+    program = read(CALLED[dialect].encode(), "part.nc", dialect)
+    setup = replace(SETUP, no_point="calculator", tools={1: Tool(100.0)})
+    fixed = fix_program(program, machine, setup, FixOptions(verify=False))
+    assert fixed.changed
+    assert [each.line for each in fixed.report.refused][-1] > 8

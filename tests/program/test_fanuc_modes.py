@@ -160,3 +160,13 @@ def test_a_feature_coordinate_system_of_haas_is_refused_until_it_ends() -> None:
 def test_m96_of_haas_jumps_by_an_input(dialect: str, refused: bool) -> None:
     found = reasons(follow("G21G0X1.\nM96P5Q8\nX2.\nN5X3.", setup=SETUP, dialect=dialect))
     assert ["M96" in reason for reason in found] == [False, refused, refused]
+
+
+@pytest.mark.parametrize("angle", [20.0, 25.0, 33.3, 71.7])
+@pytest.mark.parametrize("code", ["G28", "G30"])
+def test_increments_of_zero_to_a_reference_point_lead_by_no_way(code: str, angle: float) -> None:
+    """In turned coordinates the place is one of rounding: seen from there the words led a hair away from it."""
+    text = f"G0X1.1Y2.2Z60.3\nG68.2X.1Y.2Z.3I0J{angle}K0\nG91{code}Z0\nG90"
+    moves = follow(text, "XYZAC", setup=SETUP, dialect="fanuc").moves
+    assert (moves.block == 2).sum() == 1
+    assert (follow(text.replace("Z0\n", "Z1.\n"), "XYZAC", setup=SETUP, dialect="fanuc").moves.block == 2).sum() == 2

@@ -22,10 +22,8 @@ HEADS = {
     [
         ("fanuc", ",A30.", ",A"),
         ("fanuc", "G4Y40.", "Y"),
-        ("fanuc", "G80X5.", "X"),
         ("fanuc", "G2X10.R20.\nR25.", "R"),
         ("iso", "G4Y40.", "Y"),
-        ("iso", "G80X5.", "X"),
         ("siemens", "G4 X30", "X"),
     ],
 )
@@ -36,6 +34,16 @@ def test_a_word_that_leads_somewhere_is_never_passed_over(dialect: str, block: s
     rows = [row for row, block in enumerate(moves.block.tolist()) if block == line]
     assert moves.rule[rows[-1]] == Rule.REFUSE
     assert moves.reasons[moves.reason[rows[-1]]] == REFUSED.format(word)
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "iso"])
+@pytest.mark.parametrize("block", ["G80X5.", "G81X1.Z-5.R2.\nG80Z50."])
+def test_a_word_beside_g80_needs_a_motion_code(dialect: str, block: str) -> None:
+    moves = follow(f"{HEADS[dialect]}{block}\nG1 X1. Y2.\nM30\n", dialect=dialect, assume_zero=True).moves
+    refused = [moves.reasons[moves.reason[row]] for row in range(len(moves)) if moves.rule[row] == Rule.REFUSE]
+    assert refused[0].endswith("say G0 or G1 in the block")
+    coded = follow(f"{HEADS[dialect]}{block.replace('G80', 'G0G80')}\nG1 X1. Y2.\nM30\n", dialect=dialect).moves
+    assert (coded.rule != Rule.REFUSE).all()
 
 
 def test_a_radius_without_an_end_is_refused_as_a_word_that_is_not_taken() -> None:

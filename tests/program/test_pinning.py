@@ -20,7 +20,8 @@ HEAD = "G21 G90 G94 G17 F100\nG0 X0 Y0 Z0\n"
 
 
 def moves_of(text: str, dialect: str = "linuxcnc") -> Moves:
-    program = read(f"{HEAD}{text}\nM2\n".encode(), "part.ngc", dialect)
+    whole = text if "BEGIN PGM" in text else f"{HEAD}{text}\nM2\n"
+    program = read(whole.encode(), "part.ngc", dialect)
     return trace(program, Setup(assume_zero=True), ("X", "Y", "Z"), frozenset()).moves
 
 
@@ -82,11 +83,19 @@ def test_words_that_say_how_they_are_meant(text: str, refused: int, expected: li
 )
 def test_arcs_of_klartext(text: str, expected: list[int]) -> None:
     body = f"BEGIN PGM A MM\nL X+0 Y+0 Z+0 FMAX\nL X+1 Y+1 F100\nCC X+2 Y+1\n{text}\nEND PGM A MM\n"
-    moves = trace(
-        read(body.encode(), "part.h", "heidenhain"), Setup(assume_zero=True), ("X", "Y", "Z"), frozenset()
-    ).moves
-    found = closure_of_refusals(moves, np.array([False, False, True])).unchanged
-    assert np.flatnonzero(found[:2]).tolist() == expected
+    assert pinned(body, 2, "heidenhain") == expected
+
+
+@pytest.mark.parametrize("end", ["X10 Y10", "X=IC(10) Y=IC(10)", "X-10 Y0"])
+def test_a_sinumerik_arc_without_a_direction_gets_none_from_a_corrected_motion(end: str) -> None:
+    """A motion along Z that gets a word X of some um would be the direction in which CT goes on."""
+    assert pinned(f"G1 X5 Y5\nZ3\nCT {end}", 3, "siemens") == [1, 2]
+
+
+@pytest.mark.parametrize("end", ["X+10 Y+10", "IX+10 IY+10"])
+def test_a_klartext_arc_without_a_direction_gets_none_from_a_corrected_motion(end: str) -> None:
+    body = f"BEGIN PGM A MM\nL X+0 Y+0 Z+5 FMAX\nL X+5 Y+5 F100\nL Z+3\nCT {end}\nEND PGM A MM\n"
+    assert pinned(body, 3, "heidenhain") == [1, 2]
 
 
 def test_holes_are_drilled_where_their_blocks_say() -> None:

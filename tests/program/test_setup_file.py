@@ -261,7 +261,7 @@ def test_offsets_of_fanuc_among_settings_and_notes(tmp_path: Path, unit: str, sc
     }
 
 
-@pytest.mark.parametrize("kind", ["L1", "L11"])
+@pytest.mark.parametrize("kind", ["", "L1", "L11"])
 def test_offsets_of_fanuc_without_a_wear(tmp_path: Path, kind: str) -> None:
     """The whole on a control without L10, and a wear beside it."""
     assert table(tmp_path, "OFFSET.TXT", f"%\nG10 {kind} P3 R80.\n%\n") == {3: Tool(80.0)}

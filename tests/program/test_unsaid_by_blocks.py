@@ -209,6 +209,24 @@ def test_an_arc_with_radius_and_centre_is_written_with_its_centre_alone() -> Non
     assert not any("R" in line for line in arcs)
 
 
+@pytest.mark.parametrize("tolerance_um", [1.0, 50.0])
+@pytest.mark.parametrize("centre", ["R10. I5.", "R-15. I5.", "R15. I5. J3.", "R15. K5.", "R15. I-11. K3.", "R10. J10."])
+def test_beside_a_radius_the_words_of_a_centre_say_nothing(centre: str, tolerance_um: float) -> None:
+    """Whatever they are, the R alone counts; a word across the plane would make a helix once the R is gone.
+
+    2 um: the tolerance, or less where that is wide, and rounding to 1 um in three axes.
+    """
+    text = f"G21 G90 G54 G17\nG43 H1 G0 X0. Y0. Z50.\nG3 X0. Y20. {centre} F500.\nG1 X30.\nM30\n"
+    fixed = ncfix.fix(read(text.encode(), "a.nc", "fanuc"), THREE_AXES, setup=SETUP, tolerance_um=tolerance_um)
+    assert not fixed.report.refused
+    assert fixed.report.error_after_um["max"] < 2.0 < fixed.report.error_before_um["max"]
+
+
+@pytest.mark.parametrize("words", ["R15. P3", "R15. L2", "R15. Q5."])
+def test_an_arc_that_would_wind_without_its_radius_is_refused(words: str) -> None:
+    assert "winds further" in reasons(follow(f"G21 G90 G0 X0. Y0. Z0.\nG3 X0. Y20. {words} F500.", dialect="fanuc"))[-1]
+
+
 @pytest.mark.parametrize("centre", ["R.25", "I-.25 J0."])
 def test_arcs_in_inches_stay_arcs_with_the_digits_of_the_control(centre: str) -> None:
     """Steps of 0.0001 inch move the radii by more than half of 0.01 mm; in inches the control allows 0.001 inch."""

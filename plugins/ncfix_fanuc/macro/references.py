@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ncfix.control.moves import Motion, MotionEnd, MotionKind, Pass, Passing
 from ncfix_iso.rs274.control import Block, RS274Control
-from ncfix_iso.rs274.motion import AFTER_REFERENCE, REFERENCE_POINT, destination, go_to_reference
+from ncfix_iso.rs274.motion import AFTER_REFERENCE, REFERENCE_POINT, destination, go_to_reference, goes_by_way
 from ncfix_iso.rs274.parameters import whole
 from ncfix_iso.rs274.settings import tool_offset
 
@@ -57,7 +57,7 @@ def further(control: RS274Control, block: Block, code: int) -> None:
         return
     way = destination(control, block)
     passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(f"G30 P{number}"))
-    if way.target != control.position or (block.axes and not control.modal.incremental):
+    if goes_by_way(control, block):
         control.make(Motion(MotionKind.RAPID, block.axes, way, control.modal.motion, passing=passing))
     taken = [index for index in control.machine if block.axes >> index & 1 or not block.axes]
     unknown = control.unknown | dict.fromkeys(taken, AFTER_REFERENCE)

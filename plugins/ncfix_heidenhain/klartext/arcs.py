@@ -226,11 +226,14 @@ def give_up(control: KlartextControl, step: Step, where: FramePosition) -> bool:
 
 
 def do_without(control: KlartextControl, step: Step, where: FramePosition, reason: str) -> None:
-    """An arc that is not followed but for its end: one that the control would not accept either, or one not known."""
+    """An arc that is not followed but for its end: one that the control would not accept either, or one not known.
+
+    Of CT the motion before stays, too: a word of an axis more would give it a direction to go on in.
+    """
     about_pole = step.name in ("cp", "ctp")
     axes = polar_axes(control, step.words) if about_pole else step.words.axes or 3
     end = command_of(control, where, axes)
-    if about_pole or (step.words.unknown and not step.words.incremental):
+    if about_pole or step.name == "ct" or (step.words.unknown and not step.words.incremental):
         somewhere(control, axes, end, reason)
         return
     control.make(Motion(MotionKind.FEED, axes, end, 10, refusal=reason))

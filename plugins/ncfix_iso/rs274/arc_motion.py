@@ -58,9 +58,13 @@ def refusal_of(block: Block, plane: Plane) -> str:
 
 
 def spiral(block: Block, plane: Plane) -> str:
-    """Why an arc of ISO controls is refused: further words make it wind, on a spiral or a cone, or several times."""
-    winds = block.values.keys() & {"L", "Q"} or block.get(CENTRE_LETTERS[plane.across]) or block.get("P", 1.0) != 1.0
-    return SPIRAL if winds and "R" not in block.values else ""
+    """Why an arc of ISO controls is refused: further words make it wind, on a spiral or a cone, or several times.
+
+    Beside an R, words of its centre say nothing; L, P and Q would, once the corrected arc has its centre in words.
+    """
+    across = 0.0 if "R" in block.values else block.get(CENTRE_LETTERS[plane.across])
+    winds = block.values.keys() & {"L", "Q"} or across or block.get("P", 1.0) != 1.0
+    return SPIRAL if winds else ""
 
 
 def check_words(control: RS274Control, block: Block, plane: Plane) -> None:

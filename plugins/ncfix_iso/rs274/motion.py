@@ -13,7 +13,7 @@ from ncfix.control.expressions import Fault, Unknown, nominal
 from ncfix.control.moves import FeedMode, Motion, MotionEnd, MotionKind, Pass, Passing, UnknownAxes
 from ncfix.control.tcp import led_in_machine
 from ncfix_iso.rs274.control import Block, RS274Control
-from ncfix_iso.rs274.systems import REFERENCES, check_system, is_given, store, stored
+from ncfix_iso.rs274.systems import REFERENCES, check_system, is_given, store, stored, words_of
 
 AFTER_ROTATION = "where the axis {} goes after G68 or G69 differs from control to control until both axes are named"
 RUNTIME = "where the axis {} stands is known only at run time"
@@ -176,6 +176,7 @@ PROBING = Passing(Pass.PROBING, "probing")
 DWELL = Passing(Pass.DWELL, "dwell")
 AFTER_G53 = "where the axis {} stands after G53 in incremental coordinates (G91) differs from control to control"
 AFTER_PROBING = "where the axis {} stands after probing is known only at run time"
+WITH_CANCEL = "what a word {} beside G80 does differs from control to control: say G0 or G1 in the block"
 AFTER_REFERENCE = "where the axis {} stands after the reference point is approached is not given"
 AFTER_CYCLE = "where the axis {} stands after a turning cycle is not followed"
 NO_CODE = -2
@@ -260,11 +261,17 @@ def go_to_reference(control: RS274Control, block: Block, code: int) -> None:
     checked, control.offset_checked = control.offset_checked, True
     way = destination(control, block)
     control.offset_checked = checked
-    if way.target != control.position or (block.axes and not control.modal.incremental):
+    if goes_by_way(control, block):
         control.make(Motion(MotionKind.RAPID, block.axes, way, modal, passing=passing))
     axes = block.axes or mask_of(control.machine)
     end = reference_target(control, name, axes)
     control.make(Motion(MotionKind.RAPID, block.axes, end, modal, passing=passing))
+
+
+def goes_by_way(control: RS274Control, block: Block) -> bool:
+    """Whether the way to a reference point leads by the words of the block; increments of zero lead nowhere."""
+    values = [block.values.get(LETTERS[index], 1.0) for index in words_of(block)]
+    return any(values) if control.modal.incremental else bool(values)
 
 
 def reference_target(control: RS274Control, name: str, axes: int) -> MotionEnd:
@@ -409,3 +416,7 @@ def dwell(control: RS274Control, block: Block, code: int) -> None:
 def cancel(control: RS274Control, block: Block, code: int) -> None:
     """G80: no motion code is in force; on ISO controls the one before the cycle is again."""
     control.modal.motion = code if control.rules.strict else control.modal.straight
+    word = "" if control.rules.strict else control.path_word(control.block_words)
+    if word:
+        control.claim_words()
+        control.refuse_here(WITH_CANCEL.format(word))

@@ -23,7 +23,7 @@ STRAIGHT = 1e-9
 
 
 def tangential(control: Sinumerik, words: BlockWordValues) -> None:
-    """CT with its end; TURN adds full turns."""
+    """CT with its end; TURN adds full turns. One that is refused keeps what it begins from, and so its direction."""
     control.use_all_start_positions()
     end, heading, plane = destination(control, words), control.heading, control.modal.plane
     why = tangent_refusal(words)
@@ -31,7 +31,8 @@ def tangential(control: Sinumerik, words: BlockWordValues) -> None:
     ahead = (0.0, 0.0) if heading is None else plane.of(heading)
     chord = plane.of(step)
     if why or end.unknown or control.unknown or not math.hypot(*ahead):
-        control.go(MotionKind.FEED, words, end, CT_LEFT, refusal=why or NO_HEADING)
+        circle = circle_of(control, plane, (1.0, 0.0), 0.0)._replace(fixed=True)
+        control.go(MotionKind.ARC, words, end, CT_LEFT, refusal=why or NO_HEADING, arc=circle)
         return
     along = ahead[0] * chord[0] + ahead[1] * chord[1]
     left = ahead[0] * chord[1] - ahead[1] * chord[0]

@@ -21,6 +21,7 @@ from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.solve import (
+    NONE,
     AcceptedPlan,
     PrecedingMotion,
     SelfCheckError,
@@ -229,15 +230,17 @@ def plan_and_write_all(
     readings: Readings,
     before: PrecedingMotion | None = None,
     first: AcceptedPlan | None = None,
+    refused: Mapping[int, Reason] = NONE,
 ) -> JointPlan:
     """Plan and write a program so that all positions agree on the text; `moves` and `readings` of each of them.
 
     before, first  of a program in one position, see `plan_and_write`
+    refused        blocks that are refused whatever the plan is, and why; without `first`
     """
     if len(moves) == 1:
-        solution = plan_and_write(program, moves[0], machine, options, readings[0], before, first)
+        solution = plan_and_write(program, moves[0], machine, options, readings[0], before, first, refused)
         return JointPlan((solution,), solution.emission.splices, solution.emission.added_blocks)
-    refused, whole = dict[int, Reason](), _starting_elsewhere(moves)
+    refused, whole = dict(refused), _starting_elsewhere(moves)
     spelled, resting, left, tried = dict[int, Mask](), set[int](), set[int](), set[int]()
     while True:
         found: list[WrittenPlan] = []

@@ -22,6 +22,7 @@ from typing import Protocol
 import numpy as np
 
 from ncfix.compensate import FixOptions
+from ncfix.compensate.account import Reason
 from ncfix.compensate.block_delete import (
     JointPlan,
     Readings,
@@ -72,6 +73,8 @@ from ncfix.writer.language import WrittenLanguage
 
 ASTRAY = 1.0
 """mm; no correction and no remainder of one is so large."""
+HESITATIONS = 4
+"""Attempts that may correct what an earlier one refused; later ones may not, so that they come to an end."""
 
 
 class Proof(Protocol):
@@ -160,8 +163,14 @@ class Corrector:
         """
         task, part = self.task, continued.joined
         readings: Readings | None = [None] * len(moves)
+        refused, tries = dict[int, Reason](), 0
         while readings is not None:
-            joint = plan_and_write_all(part.program, moves, self.machine, task.options, readings, before, accepted)
+            joint = plan_and_write_all(
+                part.program, moves, self.machine, task.options, readings, before, accepted, refused
+            )
+            tries += 1
+            if tries > HESITATIONS:
+                refused, accepted = {b: why for each in joint.plans for b, why in each.reasons.items()}, None
             solution = joint.plans[0]
             if before is not None and (solution.reaches_back or solution.unchanged[0] != before.unchanged):
                 raise NotInPartsError("a refusal reaches back into an earlier part")

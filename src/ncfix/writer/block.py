@@ -268,14 +268,14 @@ class BlockWriter(BlockText):
                 self.out.centre = meant
                 return
             self._remove(word)
-        begin = self._xyz(start)
+            self._remove(self.layout.centre.get(CENTRE_LETTERS[target.plane[2]]))
         for index in target.plane[:2]:
-            centre[index] = self._centre_word(index, float(begin[index]))
+            centre[index] = self._centre_word(index, float(self._xyz(start)[index]))
         self.out.centre = centre
 
     def _has_centre(self) -> bool:
-        """Whether the arc has its centre in words, of which one that is left out is zero."""
-        return self.layout.radius is None or bool(self.layout.centre)
+        """Whether the arc has its centre in words, of which one that is left out is zero; beside an R none counts."""
+        return self.layout.radius is None
 
     def _centre_word(self, index: int, begin: float) -> float:
         target, letter, had_centre = self.target, CENTRE_LETTERS[index], self._has_centre()

@@ -38,14 +38,15 @@ BESIDES = {"ADP": "adapters of tools", "SCP": "sum offsets", "ECP": "set-up offs
 """$TC_ that lengthen a tool besides its $TC_DP."""
 
 OFFSET = re.compile(
-    rf"(?:N\d+)?(?:G9(?P<way>[01]))?G10L(?P<kind>\d+)P(?P<number>\d+)R(?P<value>{NUMBER});?", re.IGNORECASE
+    rf"(?:N\d+)?(?:G9(?P<way>[01]))?G10(?:L(?P<kind>\d+))?P(?P<number>\d+)R(?P<value>{NUMBER});?", re.IGNORECASE
 )
 AROUND = re.compile(
-    r"(?:N\d+)?(?:O\d+|(?:G(?:90|20|21|17|40|49|80|94))+|(?:G90)?G10L(?:2|20)P.*|M(?:0?2|30|99))", re.IGNORECASE
+    r"(?:N\d+)?(?:[O:]\d+|(?:G(?:90|20|21|17|40|49|80|94))+|(?:G90)?G10L(?:2|20)P.*|M(?:0?2|30|99))", re.IGNORECASE
 )
 """Blocks among tool offsets that change none: a program's number, settings, work offsets, its end."""
 INCHES = {"G20": INCH, "G21": 1.0}
 GEOMETRY, WEAR, OLD, ACROSS = 10, 11, 1, (12, 13)
+"""L of G10; controls with one table for lengths and radii write none, or L1."""
 
 
 def is_tool_data(text: str) -> bool:
@@ -108,7 +109,7 @@ def offset_rows(text: str, scale: float) -> Iterator[Row]:
             units |= {INCHES[code] for code in re.findall(r"G2[01](?!\d)", plain.upper())}
             continue
         match = OFFSET.fullmatch(plain)
-        kind = int(match["kind"]) if match else 0
+        kind = int(match["kind"] or OLD) if match else 0
         if match is None or kind not in (GEOMETRY, WEAR, OLD, *ACROSS):
             yield line, "is not understood: tool offsets are written as G10 L10 P1 R120.5, with L10 to L13"
         elif match["way"] == "1":
