@@ -55,7 +55,7 @@ from ncfix.compensate.plan.deviation import path_error
 from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.offset import is_offset
 from ncfix.compensate.report import FixReport, Tally, in_lines
-from ncfix.compensate.solve import AcceptedPlan, PrecedingMotion, WrittenPlan, accepted_plan, increments
+from ncfix.compensate.solve import AcceptedPlan, Planning, PrecedingMotion, WrittenPlan, increments
 from ncfix.compensate.workers import OpenFiles, Read, WorkShare, worker_pool
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
@@ -394,11 +394,13 @@ class PartCorrector(Corrector):
 
     def _accepted_plan(self, continued: ContinuedPart) -> AcceptedPlan:
         """The plan of a part by the long way, as far as it does not depend on what the part before has left."""
-        part = continued.joined
-        nowhere = np.zeros(len(part.moves.axes))
-        guess = None if continued.head is None else PrecedingMotion.steady(nowhere, continued.direction, nowhere)
-        task, source = self.task, part.program.source
-        return accepted_plan(part.moves, self.machine, task.dialect, task.options, guess, source=source)
+        part, task, head = continued.joined, self.task, None
+        if continued.head is not None:  # a guess
+            nowhere = np.zeros(len(part.moves.axes))
+            head = PrecedingMotion.steady(nowhere, continued.direction, nowhere).in_round(0)
+        direction = None if head is None else continued.direction
+        planning = Planning.of(part.moves, self.machine, task.dialect, task.options, direction, part.program.source)
+        return planning.accepted(head)
 
     def report(self, tally: Tally, suspicion: tuple[Message, ...]) -> FixReport:
         """The report of all parts."""

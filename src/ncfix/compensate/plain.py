@@ -35,7 +35,7 @@ from ncfix.compensate.plan.segments import Segments, accelerations, arcs_within,
 from ncfix.compensate.plan.splitting import Split
 from ncfix.compensate.plan.strategies import Strategy, get_strategy
 from ncfix.compensate.plan.written import on_digits, rounding
-from ncfix.compensate.solve import WrittenPlan, accepted_plan, closure_of
+from ncfix.compensate.solve import Planning, WrittenPlan, closure_of
 from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
 from ncfix.control.trace import taken
 from ncfix.control.turns import turns_alone
@@ -163,7 +163,7 @@ def by_the_long_way(
         return None
     near = distinct(np.concatenate([odd - 1, odd, odd + 1]))
     few = taken(moves, near)
-    accepted = accepted_plan(few, machine, dialect, options)
+    accepted = Planning.of(few, machine, dialect, options).accepted()
     if accepted.reasons or accepted.plan.findings or (accepted.unchanged != (few.kind == MotionKind.DWELL)).any():
         return None
     pieces = accepted.plan.pieces

@@ -30,8 +30,8 @@ from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import Signs
 from ncfix.compensate.plan.limits import findings, increments_beyond_travel
 from ncfix.compensate.plan.path import PathTolerance, Plan, Requirements, plan
-from ncfix.compensate.plan.strategies import get_strategy
-from ncfix.compensate.plan.written import WrittenPieces, on_digits, rounding, without_idle
+from ncfix.compensate.plan.strategies import Strategy, get_strategy
+from ncfix.compensate.plan.written import HeldAngle, WrittenPieces, on_digits, rounding, without_idle
 from ncfix.control.coordinates import INCH
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
@@ -198,14 +198,14 @@ class WrittenPlan:
 class AcceptedPlan:
     """A plan that nothing speaks against but, perhaps, its text.
 
-    intent     the motions on the machine
+    planning   what it was made with
     unchanged  (n,) motions left as they were
     reasons    block -> why it was refused
     reaches_back  a refusal needs something before the first motion as it was
     history    in each plan on the way here, whether the last motion was left as it was, and how far off its start was
     """
 
-    intent: Intent
+    planning: Planning
     plan: Plan
     unchanged: Mask
     reasons: dict[int, Reason]
@@ -216,6 +216,95 @@ class AcceptedPlan:
         """What the last motion was, the end of which was written as a command `position` (n_axes,)."""
         unchanged, shift = zip(*self.history, strict=True)
         return Round(np.array(unchanged), np.array(shift), position.copy())
+
+    def anew(self, head: Round | None) -> AcceptedPlan:
+        """Plan anew, what stays unchanged already and whatever has got a reason since; `head` as in `Planning`."""
+        return self.planning.settled(self.unchanged, self.reasons, head)
+
+
+@frozen
+class Planning:
+    """What the motions of a part are planned with, the same however often they are planned.
+
+    intent    the motions on the machine
+    strategy  finds the corrected commands
+    demands   tolerance, and what the control accepts as an arc
+    held      the angle that the control may be told, see `WrittenLanguage.held_angle`; None: any
+    """
+
+    intent: Intent
+    strategy: Strategy
+    demands: Requirements
+    held: HeldAngle | None
+
+    @classmethod
+    def of(
+        cls,
+        moves: Moves,
+        machine: Machine,
+        dialect: Dialect,
+        options: FixOptions,
+        direction: Signs | None = None,
+        source: bytes = b"",
+    ) -> Planning:
+        """For motions of a program.
+
+        direction  (n_axes,) in which the axes have come to the start, see `State`; None: not known
+        source     the text of the program, for a strategy that corrects rotary axes
+        """
+        language = language_of(dialect, WrittenLanguage)
+        tolerance = PathTolerance(options.tolerance_mm, rounding(machine))
+        return cls(
+            Intent(machine, moves, State() if direction is None else State(direction=direction)),
+            get_strategy(options.strategy),
+            Requirements(tolerance, closure_of(dialect, moves), options.split_rapids, language.arc_pieces),
+            None if language.held_angle is None else partial(language.held_angle, source),
+        )
+
+    def accepted(self, head: Round | None = None, refused: Mapping[int, Reason] = NONE) -> AcceptedPlan:
+        """Plan until nothing speaks against it.
+
+        head     what the first motion was, where it is the last one of the part before
+        refused  blocks that are refused in any case, and why
+        """
+        moves = self.intent.moves
+        unchanged = np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL))
+        return self.settled(unchanged, {**refused, **_by_rule(moves)}, head)
+
+    def settled(self, unchanged: Mask, reasons: dict[int, Reason], head: Round | None) -> AcceptedPlan:
+        """Plan until nothing speaks against it, where these motions (n,) and blocks stay unchanged from the beginning.
+
+        Motions, and the `reasons` of blocks, that have to stay besides are added.
+        """
+        moves, history, bound = self.intent.moves, list[tuple[bool, Array]](), np.zeros(len(unchanged), dtype=bool)
+        while True:
+            shift = None
+            if head is not None:
+                at = min(len(history), len(head.unchanged) - 1)
+                unchanged[0] |= head.unchanged[at]
+                shift = head.shift[at]
+            unchanged, reaches_back = _with_what_they_need(moves, unchanged, bound, reasons)
+            planned = plan(self.intent, self.strategy, self.demands, unchanged, shift)
+            if len(moves):  # of the last one
+                off = planned.start[-1] - moves.start[-1]
+                history.append((bool(planned.pieces.unchanged[-1]), np.where(np.isfinite(off), off, 0.0)))
+            planned = replace(planned, pieces=on_digits(self.intent, planned.pieces, held=self.held))
+            written = WrittenPieces(self.intent, planned.pieces, planned.start)
+            against = findings(written)
+            stays = planned.pieces.unchanged[planned.pieces.first] & ~unchanged
+            for finding in against:
+                stays[finding.moves] = True
+            beyond = increments_beyond_travel(written)
+            waiting = head is not None and len(history) < len(head.unchanged)
+            if not (stays.any() or (~bound[beyond]).any() or waiting):
+                return AcceptedPlan(self, planned, unchanged, reasons, reaches_back, tuple(history))
+            for finding in (*against, *planned.findings):
+                for k, row in enumerate(finding.moves.tolist()):
+                    if stays[row]:
+                        _explain(reasons, [int(moves.block[row])], finding.code, finding.sentence(k))
+            _explain(reasons, moves.block[stays].tolist(), CODE_OF_RULE, "no correction was found for it")
+            unchanged |= stays
+            bound[beyond] = True
 
 
 def closure_of(dialect: Dialect, moves: Moves) -> Closure:
@@ -239,12 +328,14 @@ def plan_and_write(
 
     reading  what the control made of an earlier attempt
     before   what an earlier part of the program left, where this is a part: its last motion is the first one here
-    first    the plan to begin with, from `accepted_plan`, if that has been made already
+    first    the plan to begin with, if that has been made already
     refused  blocks that are refused whatever the plan is, and why
     """
-    dialect, source = program.dialect, program.source
-    accepted = first or accepted_plan(moves, machine, dialect, options, before, refused=refused, source=source)
-    kinematics, rounds = kinematics_of(machine), list[Round]()
+    if first is None:
+        direction, head = (None, None) if before is None else (before.direction, before.in_round(0))
+        planning = Planning.of(moves, machine, program.dialect, options, direction, program.source)
+        first = planning.accepted(head, refused)
+    accepted, kinematics, rounds = first, kinematics_of(machine), list[Round]()
     while True:
         done = None if before is None else before.in_round(len(rounds)).position
         emission = emit(program, moves, accepted.plan.pieces, increments(machine), reading, done, kinematics)
@@ -256,7 +347,7 @@ def plan_and_write(
             rounds.append(accepted.round(emission.end[-1]))
         if not emission.conflicts and (before is None or len(rounds) >= len(before.rounds)):
             return WrittenPlan(
-                accepted.intent,
+                accepted.planning.intent,
                 accepted.plan,
                 emission,
                 accepted.unchanged,
@@ -268,71 +359,7 @@ def plan_and_write(
             raise AssertionError(f"blocks {sorted(emission.conflicts)} are unchanged and yet in conflict")
         for block, why in emission.conflicts.items():
             _explain(accepted.reasons, [block], CODE_OF_TEXT, why)
-        accepted = accepted_plan(moves, machine, dialect, options, before, accepted, len(rounds), source=source)
-
-
-def accepted_plan(
-    moves: Moves,
-    machine: Machine,
-    dialect: Dialect,
-    options: FixOptions,
-    before: PrecedingMotion | None = None,
-    earlier: AcceptedPlan | None = None,
-    number: int = 0,
-    refused: Mapping[int, Reason] = NONE,
-    source: bytes = b"",
-) -> AcceptedPlan:
-    """Plan until nothing speaks against it; `earlier` says what stays unchanged already, and why, in round `number`.
-
-    refused  blocks that are refused in any case, where there is no `earlier` plan
-    source   the text of the program, for a strategy that corrects rotary axes
-    """
-    unchanged = (
-        np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL))
-        if earlier is None
-        else earlier.unchanged
-    )
-    reasons = {**refused, **_by_rule(moves)} if earlier is None else earlier.reasons
-    head = None if before is None else before.in_round(number)
-    if earlier is not None:
-        intent = earlier.intent
-    else:
-        intent = Intent(machine, moves, State() if before is None else State(direction=before.direction))
-    strategy, closure = get_strategy(options.strategy), closure_of(dialect, moves)
-    tolerance = PathTolerance(options.tolerance_mm, rounding(machine))
-    language = language_of(dialect, WrittenLanguage)
-    held = None if language.held_angle is None else partial(language.held_angle, source)
-    demands = Requirements(tolerance, closure, options.split_rapids, language.arc_pieces)
-    history = list[tuple[bool, Array]]()
-    bound = np.zeros(len(moves), dtype=bool)
-    while True:
-        shift = None
-        if head is not None:
-            at = min(len(history), len(head.unchanged) - 1)
-            unchanged[0] |= head.unchanged[at]
-            shift = head.shift[at]
-        unchanged, reaches_back = _with_what_they_need(moves, unchanged, bound, reasons)
-        planned = plan(intent, strategy, demands, unchanged, shift)
-        if len(moves):  # of the last one
-            off = planned.start[-1] - moves.start[-1]
-            history.append((bool(planned.pieces.unchanged[-1]), np.where(np.isfinite(off), off, 0.0)))
-        planned = replace(planned, pieces=on_digits(intent, planned.pieces, held=held))
-        written = WrittenPieces(intent, planned.pieces, planned.start)
-        against = findings(written)
-        stays = planned.pieces.unchanged[planned.pieces.first] & ~unchanged
-        for finding in against:
-            stays[finding.moves] = True
-        beyond = increments_beyond_travel(written)
-        waiting = head is not None and len(history) < len(head.unchanged)
-        if not (stays.any() or (~bound[beyond]).any() or waiting):
-            return AcceptedPlan(intent, planned, unchanged, reasons, reaches_back, tuple(history))
-        for finding in (*against, *planned.findings):
-            for k, row in enumerate(finding.moves.tolist()):
-                if stays[row]:
-                    _explain(reasons, [int(moves.block[row])], finding.code, finding.sentence(k))
-        _explain(reasons, moves.block[stays].tolist(), CODE_OF_RULE, "no correction was found for it")
-        unchanged |= stays
-        bound[beyond] = True
+        accepted = accepted.anew(None if before is None else before.in_round(len(rounds)))
 
 
 def _with_what_they_need(moves: Moves, unchanged: Mask, bound: Mask, reasons: dict[int, Reason]) -> tuple[Mask, bool]:
