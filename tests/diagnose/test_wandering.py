@@ -9,7 +9,8 @@ import pytest
 
 from diagnose.worlds import SIGMA_UM, World
 from ncfix.diagnosis.effect_form import EffectForm
-from ncfix.diagnosis.noise import DRIFT_TIME, estimated_background, everything_covariance
+from ncfix.diagnosis.evidence import DRIFT_TIME
+from ncfix.diagnosis.noise import estimated_background, everything_covariance
 from ncfix.diagnosis.residual_data import residual_data
 from ncfix.measure.measurement import Array
 

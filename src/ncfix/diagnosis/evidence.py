@@ -67,6 +67,8 @@ UNNAMED = float(np.log(20.0))
 """Log odds beforehand against what is in no catalogue."""
 MISSHAPEN = 0.2
 """How much the shape of an effect may differ from that of the catalogue, as a share of what it shows."""
+DRIFT_TIME = 900.0
+"""s: how long an instrument's wandering lasts."""
 USUAL_SHARE = SHARES[2]
 """The share of the background at which it is asked what the members show."""
 
@@ -81,9 +83,8 @@ class Background:
     spectrum  (n,) variance of everything at a size of one noise, along the coordinates
     sigma     um, standard deviation of one plain value before anything was looked at
     freedom   degrees of freedom of that; the data have n of their own
-    wander    size of the instrument's wandering against the noise
+    drift     size of the instrument's wandering against the noise
     everything  (m, m) covariance of a little of everything at 1 um, um^2
-    slow      (m, m) correlation of the wandering, in units of each value's noise
     """
 
     data: ResidualData
@@ -94,17 +95,21 @@ class Background:
     freedom: float
     drift: float
     everything: Array
-    slow: Array | None
     precisions: dict[float, Array] = field(default_factory=dict)
 
     def precision(self, share: float) -> Array:
         """The inverse of the covariance of all values with this share of everything, um^-2, (m, m); computed once."""
         if share not in self.precisions:
-            inner = np.eye(len(self.relative)) + share**2 * in_noise(self.everything, self.relative)
-            if self.slow is not None:
-                inner = inner + self.drift**2 * self.slow
-            scale = self.sigma * self.relative
-            self.precisions[share] = inverse(inner) / scale[:, None] / scale
+            covariance = with_noise(self.everything, share, self.relative)
+            wandering = wandering_correlation(self.data, self.relative) if self.drift else None
+            if wandering is not None:
+                wandering *= self.drift**2
+                covariance += wandering
+                del wandering
+            found, scale = inverse(covariance), self.sigma * self.relative
+            found /= scale[:, None]
+            found /= scale
+            self.precisions[share] = found
         return self.precisions[share]
 
     def seen(self, columns: Array) -> Array:
@@ -123,6 +128,31 @@ def in_noise(covariance: Array, relative: Array) -> Array:
     scaled = covariance / relative[:, None]
     scaled /= relative
     return scaled
+
+
+def with_noise(everything: Array, share: float, relative: Array) -> Array:
+    """The covariance (m, m) of noise and a share of everything, in units of each value's noise; `relative` (m,)."""
+    found = in_noise(everything, relative / share)
+    found[np.diag_indices_from(found)] += 1.0
+    return found
+
+
+def wandering_correlation(data: ResidualData, relative: Array) -> Array | None:
+    """What the times between values of one component say of their wandering together, in units of each value's noise.
+
+    (m, m), by `relative` (m,); None without a clock.
+    """
+    time = data.column("time_s")
+    if np.ptp(time) == 0:
+        return None
+    row = np.maximum(data.row, 0)
+    own, file = time[row], data.file[row]
+    lasting: Array = np.subtract.outer(own / DRIFT_TIME, own / DRIFT_TIME)
+    np.exp(np.negative(np.abs(lasting, out=lasting), out=lasting), out=lasting)
+    lasting *= (data.component[:, None] == data.component) & (data.row[:, None] >= 0) & (file[:, None] == file)
+    lasting /= relative[:, None]
+    lasting /= relative
+    return lasting
 
 
 def marginal(squares: float, log_determinant: float, count: int, freedom: float) -> float:

@@ -229,14 +229,14 @@ def _predicted(
     precision = background.precision(share)
     weighed = precision @ signal
     inner = np.eye(signal.shape[1]) + signal.T @ weighed
-    inverse = precision - weighed @ np.linalg.solve(inner, weighed.T)
-    solved, error = inverse @ y, np.full(len(y), np.nan)
+    carried = np.linalg.solve(inner, weighed.T)  # the inverse with the signal in it is precision - weighed @ carried
+    solved, error = precision @ y - weighed @ (carried @ y), np.full(len(y), np.nan)
     for test in tests:
         if test.any() and not test.all():
-            spread = np.linalg.inv(inverse[np.ix_(test, test)])
+            spread = np.linalg.inv(precision[np.ix_(test, test)] - weighed[test] @ carried[:, test])
             missed = np.where(test, 0.0, y)
             missed[test] = y[test] - spread @ solved[test]
-            others = np.where(test, 0.0, inverse @ missed)
+            others = np.where(test, 0.0, precision @ missed - weighed @ (carried @ missed))
             told = np.diag(spread) < (BLIND * background.sigma * background.relative[test]) ** 2
             error[test] = np.where(told, y[test] - signal[test] @ (signal.T @ others), np.nan)
     error[background.relative > 0.1 * ASIDE] = np.nan

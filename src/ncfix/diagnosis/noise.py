@@ -28,17 +28,26 @@ from scipy.linalg import cholesky, eigh, qr, solve_triangular
 from scipy.special import chdtrc, fdtrc
 
 from ncfix.diagnosis.effect_form import Blocks, EffectForm, block_odds, blocks_of, column_bounds, side_by_side
-from ncfix.diagnosis.evidence import MISSHAPEN, TOGETHER, Background, entry_price, in_noise, marginal
+from ncfix.diagnosis.evidence import (
+    MISSHAPEN,
+    TOGETHER,
+    Background,
+    entry_price,
+    in_noise,
+    marginal,
+    wandering_correlation,
+    with_noise,
+)
 from ncfix.diagnosis.forms import shape_variations, without_lacking_constants
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse, orthonormal
 from ncfix.measure.measurement import Array, Measurement, groups
 from ncfix.values import frozen
 
-DRIFT_TIME = 900.0
-"""s: how long an instrument's wandering lasts."""
 DRIFT_SIZES = (0.0, 0.15, 0.35, 0.7)
-"""Its size against the noise."""
+"""How large an instrument's wandering may be against the noise."""
+ROWS = 256
+"""Values of which a product of all with all is made at once."""
 EVERYTHING_SHARE = 0.35
 """Size of everything else together, against the noise, while it is asked how much the instrument wanders."""
 MOST_COURSES = 4
@@ -155,33 +164,28 @@ def estimated_background(
     sigma, freedom = _noise(data)
     free = error_contrasts(data.base / relative[:, None])
     inner = free.of(in_noise(everything, relative))
-    slow, drift, noise = _drift_correlation(data, relative), 0.0, None
+    slow, drift = wandering_correlation(data, relative), 0.0
     if slow is not None:
-        seen = free.of(slow)
+        noise = free.of(slow)
+        del slow
         drift = _likeliest_drift(
-            DriftLikelihood(free, sigma * relative, data.y, inner, seen, freedom), named, data.sizes
+            DriftLikelihood(free, sigma * relative, data.y, inner, noise, freedom), named, data.sizes
         )
-        noise = np.eye(len(seen)) + drift**2 * seen if drift else None
-    spectrum, vectors = eigh(inner, noise, driver="evd" if noise is None else "gvd", overwrite_a=True, overwrite_b=True)
-    rotation = free.values(vectors) / relative[:, None]
-    return Background(data, relative, rotation, np.maximum(spectrum, 0.0), sigma, freedom, drift, everything, slow)
+        noise *= drift**2
+        noise[np.diag_indices_from(noise)] += 1.0
+    # both are symmetric: turned over they are worked on where they stand
+    if drift:
+        spectrum, vectors = eigh(inner.T, noise.T, driver="gvd", overwrite_a=True, overwrite_b=True)
+    else:
+        spectrum, vectors = eigh(inner.T, driver="evd", overwrite_a=True)
+    rotation = free.values(vectors)
+    rotation /= relative[:, None]
+    return Background(data, relative, rotation, np.maximum(spectrum, 0.0), sigma, freedom, drift, everything)
 
 
 def _noise(data: ResidualData) -> tuple[float, float]:
     """Noise of a plain value, um, and how well it is known."""
     return data.sigma, STATED_NOISE if data.noise_stated else UNKNOWN_NOISE
-
-
-def _drift_correlation(data: ResidualData, relative: Array) -> Array | None:
-    """The correlation of values of one component by the time between them; None without a clock."""
-    time = data.column("time_s")
-    if np.ptp(time) == 0:
-        return None
-    row = np.maximum(data.row, 0)
-    own, file = time[row], data.file[row]
-    alike = (data.component[:, None] == data.component) & (data.row[:, None] >= 0) & (file[:, None] == file)
-    lasting = np.where(alike, np.exp(-np.abs(own[:, None] - own) / DRIFT_TIME), 0.0)
-    return in_noise(lasting, relative)
 
 
 @frozen(repr=False, slots=False)
@@ -308,9 +312,11 @@ class PlainModel:
     def of(cls, data: ResidualData, everything: Array) -> PlainModel:
         """With everything's covariance (m, m) at 1 um, um^2."""
         base = orthonormal(data.base / data.relative[:, None])
-        precision = inverse(np.eye(len(data.y)) + GENEROUS_SHARE**2 * in_noise(everything, data.relative))
+        precision = inverse(with_noise(everything, GENEROUS_SHARE, data.relative))
         solved = precision @ base
-        precision -= solved @ np.linalg.solve(base.T @ solved, solved.T)
+        known = np.linalg.solve(base.T @ solved, solved.T)
+        for start in range(0, len(precision), ROWS):  # some at a time take less memory
+            precision[start : start + ROWS] -= solved[start : start + ROWS] @ known
         return cls(data, data.y / data.relative, precision)
 
     def less(self, beside: Array) -> Array:
@@ -341,7 +347,8 @@ class PlainModel:
         best, found = LIKELY, None
         for start in range(0, len(some), TOGETHER):
             part = some[start : start + TOGETHER]
-            columns = LARGE * side_by_side(group.columns for group in part) / self.data.relative[:, None]
+            columns = np.concatenate([group.single.T for group in part]).T.astype(np.float64)
+            columns *= LARGE / self.data.relative[:, None]
             inner = self._inner(dynamic, start, columns, column_bounds(part))
             odds = block_odds(inner, columns.T @ solved, less.T @ columns, total, count, self.data.sizes)
             form, size = (int(k) for k in np.unravel_index(int(odds.argmax()), odds.shape))

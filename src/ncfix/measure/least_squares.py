@@ -118,15 +118,17 @@ def orthonormal(columns: Array) -> Array:
 
 
 def inverse(matrix: Array) -> Array:
-    """The inverse of a symmetric positive definite matrix (n, n), by its Cholesky factor.
+    """The inverse of a symmetric positive definite matrix (n, n), in its place, by its Cholesky factor.
 
     Raises `numpy.linalg.LinAlgError` where it is none.
     """
-    factor, failed = dpotrf(matrix, lower=1)
+    factor, failed = dpotrf(matrix.T, lower=1, overwrite_a=1)
     if failed:
         raise np.linalg.LinAlgError("not positive definite")
-    half = dpotri(factor, lower=1, overwrite_c=1)[0]
-    return np.tril(half) + np.tril(half, -1).T
+    found: Array = dpotri(factor, lower=1, overwrite_c=1)[0].T
+    for k in range(len(found) - 1):
+        found[k + 1 :, k] = found[k, k + 1 :]
+    return found
 
 
 def without(basis: Array, columns: Array) -> Array:
