@@ -173,22 +173,17 @@ class Pairing:
 
     def _stretch(self, own: Sequence[int], other: Sequence[int], i: int, j: int) -> tuple[int, int]:
         """Lines that hold a path only, from here on in both; the line before may have been split, too."""
-        end, stop = i, j
-        while end < len(own) and own[end] == NO_KEY:
-            end += 1
-        while stop < len(other) and other[stop] == NO_KEY:
-            stop += 1
+        end, stop = _end_of_paths(own, i), _end_of_paths(other, j)
         if self.pairs and self.pairs[-1].row == i - 1 and self.original.lines[i - 1].path:
             i, j = i - 1, self.pairs.pop().first
-        ours, theirs = self.original.lines, self.corrected.lines
-        more = (stop - j) - (end - i)
-        row, astray = i - 1, False
-        while (row := row + 1) < end:
+        more = (stop - j) - (end - i)  # lines that must have been put in from here on
+        row, astray = i, False
+        while row < end:
             count = min(end - row, stop - j) - 1
             if count > SEVERAL and (count := self._one_by_one(row, j, count)):
                 self.pairs.append_run(row, j, count)
                 row, j, astray = row + count, j + count, False
-            if more > 0 and not self.followed(row) and not (j < stop and ours[row].says(theirs[j])):
+            if more > 0 and not self.followed(row) and not self._says_the_same(row, j, stop):
                 astray = True  # until a line leads where it should
             if astray:
                 self.unsure.add(row)
@@ -196,21 +191,30 @@ class Pairing:
             if j >= stop or (not whole and self._is_gone(row, j, end)):
                 self._lost(row)
                 more += 1
-                continue
-            last = stop - 1 if whole else self._last(row, j, j + max(more, 0), min(stop, j + AHEAD))
-            if last + 1 < stop and more > last - j and not whole:
-                behind, following = self.corrected.lines[last + 1], self.original.lines[min(row + 1, len(own) - 1)]
-                put_back = _begins(behind, "CC") and _begins(self.original.lines[row], *ARCS)
-                last += (not behind.path and following.path != []) or (
-                    put_back and not _begins(following, "CC", *ARCS)  # a pole before an arc belongs to that one
-                )
-            self.pairs.append(row, j, last)
-            astray = astray and not (self.moves(row) and self.followed(row) and self.nearness(row, last))
-            more -= last - j
-            j = last + 1
+            else:
+                last = stop - 1 if whole else self._last_piece(row, j, more, stop)
+                self.pairs.append(row, j, last)
+                astray = astray and not (self.moves(row) and self.followed(row) and self.nearness(row, last))
+                more -= last - j
+                j = last + 1
+            row += 1
         if i == end or more > 0:
             self._extra(j, stop)
         return end, stop
+
+    def _says_the_same(self, row: int, at: int, stop: int) -> bool:
+        return at < stop and self.original.lines[row].says(self.corrected.lines[at])
+
+    def _last_piece(self, row: int, first: int, more: int, stop: int) -> int:
+        """The last of the lines that stand for one; what puts a feed or a pole back stands behind its last piece."""
+        last = self._last(row, first, first + max(more, 0), min(stop, first + AHEAD))
+        if last + 1 >= stop or more <= last - first:
+            return last
+        ours, behind = self.original.lines, self.corrected.lines[last + 1]
+        following = ours[min(row + 1, len(ours) - 1)]
+        feed = not behind.path and following.path != []
+        pole = _begins(behind, "CC") and _begins(ours[row], *ARCS)
+        return last + (feed or (pole and not _begins(following, "CC", *ARCS)))  # a pole before an arc belongs to that
 
     def _one_by_one(self, row: int, at: int, count: int) -> int:
         """How many of so many lines have one line each in their place, from these on; a few may be left out."""
@@ -282,6 +286,13 @@ def _number(key: str | None) -> int:
     return hash(key[block.end() :]) ^ hash_of(block[1]) if block else hash(key)
 
 
+def _end_of_paths(keys: Sequence[int], at: int) -> int:
+    """The first line from here on that holds more than a path."""
+    while at < len(keys) and keys[at] == NO_KEY:
+        at += 1
+    return at
+
+
 def _ahead(keys: Sequence[int], at: int, wanted: int) -> int:
     """How far behind a line there is one with this key, `FAR` if there is none near."""
     if wanted in (NO_KEY, EMPTY_KEY):
@@ -300,50 +311,54 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> lis
     arc    the motion is an arc: it may have become straight, and its radius a centre
     timed  its F is an inverse time, and its pieces have parts of it
     """
-    line = pairing.original.lines[pair.row]
+    family, line = pairing.original.family, pairing.original.lines[pair.row]
     pieces = pairing.corrected.lines[pair.first : pair.last + 1]
-    head, last = pieces[0], pieces[-1]
-    if line.odd:
+    head, split = pieces[0], len(pieces) > 1
+    if line.odd or (not split and _has_only_more_axes(line, head)):
         return []
-    if line.plain and head.plain and pair.first == pair.last and (line.rest, line.block) == (head.rest, head.block):
-        ours_first = zip(line.path, head.path, strict=False)
-        if len(head.path) >= len(line.path) and all(one.name == other.name for one, other in ours_first):
-            return []
     found: list[str] = []
     if any(piece.skipped != line.skipped for piece in pieces):
         found.append("a line of the block has another mark of block delete")
     twice = "" if line.doubled() else next((piece.doubled() for piece in pieces if piece.doubled()), "")
     if line.path and twice:
         found.append(f"two words {twice} in a block")
-    klartext = pairing.original.family is Family.KLARTEXT
-    ours, theirs = line.rest, head.rest
-    if len(pieces) > 1:
-        late = LATE[pairing.original.family]
-        if _words(STOPS, line.rest) != _words(STOPS, last.rest):
-            found.append("a stop is not at the end of the pieces of its block")
-        elif sorted(_words(late, line.rest)) != sorted(word for piece in pieces for word in _words(late, piece.rest)):
-            found.append("a word that acts at the end of the block is lost, or there twice")
-        ours, theirs = late.sub("", ours), late.sub("", theirs)
+    if split:
+        found += _late_faults(line, pieces, LATE[family])
+    klartext = family is Family.KLARTEXT
+    turned = _begins(head, "CC") or (_begins(head, "CP") and not _begins(line, "CP"))
+    if klartext and arc and (split or turned):
+        return found  # of other words than before
+    free = [LATE[family]] if split else []
     if arc or (klartext and _begins(line, "CC")):
-        motion = MOTION.get(pairing.original.family, MOTION[Family.WORDS])
-        ours, theirs = motion.sub("", ours), motion.sub("", theirs)
-    turns = _begins(head, "CP") and not _begins(line, "CP")
-    circle = klartext and arc and (len(pieces) > 1 or _begins(head, "CC") or turns)
-    if not circle and ours.rstrip() != theirs.rstrip() and not _paced(ours, theirs, line, timed):
+        free.append(MOTION.get(family, MOTION[Family.WORDS]))
+    ours, theirs = line.rest, head.rest
+    for words in free:
+        ours, theirs = words.sub("", ours), words.sub("", theirs)
+    if ours.rstrip() != theirs.rstrip() and not _paced(ours, theirs, line, timed):
         found.append("words that are no axes have changed")
-    if circle:
-        return found
     names = [word.name for word in line.path if not arc or word.name in "XYZABCUVW"]
     left = [word.name for word in head.path]
-    for name in names:
-        if name not in left:
-            found.append(f"the word {name} is not there any more")
-    common = [name for name in left if name in names]
-    if not found and common != names:
-        found.append("words have changed their places")
-    if klartext and head.block != line.block:
-        found.append("the block has another number")
-    return found
+    lost = [f"the word {name} is not there any more" for name in names if name not in left]
+    if not (found or lost) and [name for name in left if name in names] != names:
+        lost = ["words have changed their places"]
+    number = ["the block has another number"] if klartext and head.block != line.block else []
+    return [*found, *lost, *number]
+
+
+def _has_only_more_axes(line: TextLine, other: TextLine) -> bool:
+    """Whether a plain line has the words of another in their order, and perhaps more axes behind them."""
+    if not (line.plain and other.plain and (line.rest, line.block) == (other.rest, other.block)):
+        return False
+    return [word.name for word in other.path[: len(line.path)]] == [word.name for word in line.path]
+
+
+def _late_faults(line: TextLine, pieces: Sequence[TextLine], late: re.Pattern[str]) -> list[str]:
+    """What is wrong with the words of pieces that act at the end of their block."""
+    if _words(STOPS, line.rest) != _words(STOPS, pieces[-1].rest):
+        return ["a stop is not at the end of the pieces of its block"]
+    if sorted(_words(late, line.rest)) != sorted(word for piece in pieces for word in _words(late, piece.rest)):
+        return ["a word that acts at the end of the block is lost, or there twice"]
+    return []
 
 
 def _words(which: re.Pattern[str], text: str) -> list[str]:
