@@ -63,38 +63,61 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     """The mistake that explains the data better than the file as it stands, if one does: by log odds."""
     measurements = tuple(measurements)
     now = misfit(measurements, machine)
-    left, typed = now.left(), any(looks_typed(effect) for effect in machine.effects)
-    far, names = left >= SUSPECT * now.noise or typed, {plain(name) for name in refused}
-    standing = now.left(AS_IT_STANDS_UM)
-    moved = standing >= SUSPECT * max(left, now.noise)  # constants, or points of axes, or units
-    kinds = not_of_first_order if far else looking_like_constants
-    deep = [each for each in kinds(measurements, machine, now) if plain(each.name) not in names] if far or moved else []
-    tried = _judged(measurements, machine, now, TIGHT_UM, deep, names)
-    found = max(tried, key=lambda each: each.odds, default=None)
-    if (found is None or found.odds <= 0) and moved:
-        tried = _judged(measurements, machine, now, AS_IT_STANDS_UM, (), names)
-        tried = [each for each in tried if each.after_um**2 - left**2 < OTHERWISE * (standing**2 - left**2)]
-        found = max(tried, key=lambda each: each.odds, default=None)
-    if found is None or found.odds <= 0:
+    tried = _suspects(measurements, machine, now, {plain(name) for name in refused})
+    best = max(tried, key=lambda each: each.odds, default=None)
+    if best is None or best.odds <= 0:
         return None
     slack = now.count * float(np.log(AS_SIMPLE))
-    alike = [each for each in tried if each.odds > found.odds - slack and each.stretch == found.stretch]
+    alike = [each for each in tried if each.odds > best.odds - slack and each.stretch == best.stretch]
+    found = _simplest(alike, [each for each in tried if each.replaces and each.after_um < AS_SIMPLE * best.after_um])
+    if found.odds <= 0:
+        return None
+    near = [each for each in alike if each.odds > found.odds - ALIKE and each is not found]
+    torn = len({each.machine == machine for each in (found, *near)}) > 1
+    components = len(now.problem.values) / max(sum(map(len, measurements)), 1)
+    return replace(
+        found,
+        given_um=now.left(AS_IT_STANDS_UM) * float(np.sqrt(components)),
+        aliases=(*dict.fromkeys(each.name for each in near if each.name != found.name), *found.aliases),
+        sure=found.odds > NAMES_COST and (found.gained is not None or _reaches_noise(found, now)),
+        torn=torn,
+        remedy=f"{TORN}{_sense(measurements)}" if torn else found.remedy,
+    )
+
+
+def _suspects(
+    measurements: tuple[Measurement, ...], machine: Machine, now: Misfit, refused: Collection[str]
+) -> list[Mistake]:
+    """Mistakes that may be behind what the file leaves, with their log odds.
+
+    If none is likely, but constants of the file would have to move to explain the data: those that spare them that.
+    """
+    left, standing = now.left(), now.left(AS_IT_STANDS_UM)
+    far = left >= SUSPECT * now.noise or any(looks_typed(effect) for effect in machine.effects)
+    moved = standing >= SUSPECT * max(left, now.noise)  # constants, or points of axes, or units
+    deep: list[Mistake] = []
+    if far or moved:
+        kinds = not_of_first_order if far else looking_like_constants
+        deep = [each for each in kinds(measurements, machine, now) if plain(each.name) not in refused]
+    tried = _judged(measurements, machine, now, TIGHT_UM, deep, refused)
+    if moved and not any(each.odds > 0 for each in tried):
+        most = OTHERWISE * (standing**2 - left**2)
+        tried = _judged(measurements, machine, now, AS_IT_STANDS_UM, (), refused)
+        tried = [each for each in tried if each.after_um**2 - left**2 < most]
+    return tried
+
+
+def _simplest(alike: Sequence[Mistake], others: Sequence[Mistake]) -> Mistake:
+    """The simplest of mistakes that explain the data alike.
+
+    If the file does not agree with the data once that is undone, the likeliest point of an axis with which it does; or
+    else of `others`, with which its constants are other ones.
+    """
     simplest = min(alike, key=lambda each: (each.fitted, -each.odds))
-    others = [each for each in tried if each.replaces and each.after_um < AS_SIMPLE * found.after_um]
     if (others or len(alike) > 1) and not _stands(simplest):
         points = [each for each in alike if each.name.startswith(PIVOT) and _stands(each)]
-        if points or others:
-            simplest = max(points or others, key=lambda each: each.odds)
-    if simplest.odds <= 0:
-        return None
-    components = len(now.problem.values) / max(sum(map(len, measurements)), 1)
-    near = [each for each in alike if each.odds > simplest.odds - ALIKE and each is not simplest]
-    aliases = (*dict.fromkeys(each.name for each in near if each.name != simplest.name), *simplest.aliases)
-    sure = simplest.odds > NAMES_COST and (simplest.gained is not None or _reaches_noise(simplest, now))
-    torn = len({each.machine == machine for each in (simplest, *near)}) > 1
-    given_um = standing * float(np.sqrt(components))
-    remedy = f"{TORN}{_sense(measurements)}" if torn else simplest.remedy
-    return replace(simplest, given_um=given_um, aliases=aliases, sure=sure, torn=torn, remedy=remedy)
+        return max(points or others or [simplest], key=lambda each: each.odds)
+    return simplest
 
 
 def _sense(measurements: Sequence[Measurement]) -> str:
