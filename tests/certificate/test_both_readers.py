@@ -67,12 +67,25 @@ CASES = {
     "a work offset with block delete, and rotary axes": Shop(
         "iso", "table", "G21 G90 G17 G54\nG0 X-61 Y-22 Z41 A-65 C52\n/G55\nX6 Y-48 Z0\nG1 X40 C-43. F200\nM2\n", 3
     ),
+    "another tool in turned coordinates, whose length is not turned": Shop(
+        "siemens",
+        "table",
+        "G17 G71 G90\nT1 D1 M6\nG54\nG0 X0 Y0 Z60 A0 C0\nAROT X32 Z12\nT2 D1 M6\nG0 X0 Y0 Z60\nG1 X40 Z50 F500\nM30\n",
+        3,
+    ),
+    "another length in coordinates that are turned about Y": Shop(
+        "fanuc",
+        "table",
+        "G21 G18 G90 G54\nG43 H1\nG0 X10. Y5. Z30. A0. C0.\nG68 X10. Z5. R20.\nG43 H2\nG0 X10. Y6. Z30.\n"
+        "G1 X22. Z20. F500.\nG69\nG0 X0. Y0. Z60.\nM30\n",
+        4,
+    ),
 }
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_both_readers_follow_alike(case: Shop) -> None:
-    tools = {number: Tool(length, 3.0) for number, length in ((0, 80.0), (1, 60.0))}
+    tools = {number: Tool(length, 3.0) for number, length in ((0, 80.0), (1, 60.0), (2, 95.0))}
     setup, known, dialect = Setup(tools=tools, assume_zero=True, tcp=case.tcp), machine(case.machine), get(case.dialect)
     text = case.text.encode()
     options = FixOptions(verify=False, allow_refused=True, tolerance_um=5.0)

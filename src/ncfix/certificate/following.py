@@ -480,8 +480,13 @@ class AxisFollower:
         self.new_length(self.length_of(self.tool) if number and self.tool else 0.0)
 
     def new_length(self, length: float | None) -> None:
-        """Another tool length is in force in coordinates."""
-        self.length, self.between = length, False
+        """Another tool length is in force in coordinates; it lies along Z of the machine, however they are turned."""
+        before, self.length, self.between = self.length, length, False
+        if self.turn is not None and not self.tcp and self.turn.rotation[2, 2] != 1.0:
+            place = self.turn.commands(np.array([[*self.at.values()]]))[0]
+            longer = np.array([0.0, 0.0, NAN if before is None or length is None else length - before])
+            self.turn = replace(self.turn, zero=self.turn.zero + longer, origin=self.turn.origin + longer)
+            self._stand_at(self.turn.numbers(place), self.turn)
         self.unsay("Z" if not self.tcp or (self.turn is not None and self.is_square()) else "XYZ")
 
 
