@@ -32,7 +32,7 @@ WORDS_QUIET = re.compile(
 )
 """Words of SINUMERIK that move nothing and change no coordinates."""
 DECLARES = frozenset(("DEF", "EXTERN"))
-SINGLE = frozenset("NFSTDMHPLEQO")
+SINGLE = frozenset("GNFSTDMHPLEQO")
 """Letters whose words are seen to, or mean nothing here."""
 
 
@@ -53,33 +53,32 @@ class WordAddressFollower(AxisFollower):
         codes = [round(10 * word.value) for word in line.codes if word.name == "G" and word.value is not None]
         if line.odd and (codes or line.path):
             self.lost["odd"] = line.odd
-        if self._shifted(line, codes) or self._smooths(line, codes) or self._turned(line, codes):
+        if self._smooths(line, codes) or self._changed_coordinates(line, codes):
             return None
         apart, fixed = self._modes(line, codes)
         words = {word.name: word for word in line.path if word.name in AXES}
         if apart:
-            if line.path and apart != "dwell":
-                return self.step(row, Kind.FIXED, dict(self.at), line, apart)
-            return None
-        if fixed or 280 in codes or 300 in codes:
+            moves = line.path and apart != "dwell"
+            return self.step(row, Kind.FIXED, dict(self.at), line, apart) if moves else None
+        if fixed:
             return self._fixed(row, line, words, codes)
-        if not line.path:
-            return None
-        if not words and self.kind != Kind.ARC:
+        return self._motion(row, line, words) if line.path else None
+
+    def _motion(self, row: int, line: TextLine, words: Mapping[str, TextWord]) -> AxisStep:
+        """A motion of the kind that is in force."""
+        if not words and self.kind is not Kind.ARC:
             self.lost["odd"] = UNKNOWN_WORDS
             return self.step(row, Kind.FEED, dict(self.at), line, UNKNOWN_WORDS)
         if self.kind is None:
             return self.step(row, Kind.FEED, dict(self.at), line, "which motion this is")
-        if self.kind == Kind.HOLE:
+        if self.kind is Kind.HOLE:
             return self._hole(row, line, words)
-        if self.kind != Kind.ARC and len(line.path) > len(words):
+        arc = self.kind is Kind.ARC
+        if len(line.path) > len(words) and not arc:  # such as R or RND
             return self.step(row, self.kind, dict(self.at), line, UNKNOWN_WORDS)
         start = dict(self.at)
         step = self.step(row, self.kind, self.target({k: v for k, v in words.items() if k in self.at}), line)
-        step.said = [self.said[axis] for axis in self.axes]
-        if self.kind == Kind.ARC and not step.why:
-            return self._arc_of_words(step, line, start)
-        return step
+        return self._arc_of_words(step, line, start) if arc and not step.why else step
 
     def _smooths(self, line: TextLine, codes: Sequence[int]) -> bool:
         """Whether a line does nothing but say how the control smooths the path, and for which axes (G5.1 Q2 X0 Y0)."""
@@ -88,69 +87,71 @@ class WordAddressFollower(AxisFollower):
             return False
         return (codes == [51] and "Q" in own) or (codes in ([50], [1870]) and not line.path)
 
-    def _shifted(self, line: TextLine, codes: Sequence[int]) -> bool:
-        """Take in a shift by G52, G92, G92.1, TRANS or ATRANS without other G or M codes; False if it is none."""
-        words = self.family is Family.WORDS
-        names = [word.name for word in line.codes if word.name not in ("NTSF" if words else "N")]
-        if words:
-            how = codes[0] if names == ["G"] and codes in ([520], [920], [921]) else 0
-        else:
-            how = {"TRANS": 1, "ATRANS": 2}.get(" ".join(names), 0)
-        values = {word.name: word.value for word in line.path if not word.counted}
-        tilted = self.turn is not None and self.turn.tilted
-        if not how or self.lost or line.odd or self.beside or self.counting or line.doubled():
+    def _changed_coordinates(self, line: TextLine, codes: Sequence[int]) -> bool:
+        """Take in a line that only shifts or turns the coordinates, by plain numbers; False if it does not."""
+        values = {word.name: word.value for word in line.path if word.value is not None and not word.counted}
+        if len(values) < len(line.path) or self.lost or line.odd or self.beside:
             return False
-        if (self.tcp and not tilted) or (words and self.turn is not None):
+        names = [word.name for word in line.codes if word.name != "N"]
+        if self.family is Family.SINUMERIK:
+            return self._shifted_frame(names, values) or self._turned_frame(line, names, values)
+        return self._shifted(line, codes, values) or self._turned(names, codes, values)
+
+    def _shifted(self, line: TextLine, codes: Sequence[int], values: Mapping[str, float]) -> bool:
+        """Take in G52, G92 or G92.1 without other G or M codes; False if it is none."""
+        if [word.name for word in line.codes if word.name not in "NTSF"] != ["G"]:
             return False
-        if len(values) < len(line.path) or not values.keys() <= self.at.keys() or None in values.values():
+        if self.tcp or self.turn is not None or self.counting or not values.keys() <= self.at.keys():
             return False
-        numbers = {axis: (value or 0.0) * self.scale(axis) for axis, value in values.items()}
-        match how:
-            case 520 if values and not any(self.shifts.get(axis) for axis in numbers):
+        numbers = {axis: value * self.scale(axis) for axis, value in values.items()}
+        match codes:
+            case [520] if numbers and not any(self.shifts.get(axis) for axis in numbers):
                 self.local |= numbers
-            case 920 if values and not any(math.isnan(self.at[axis]) for axis in numbers):
+            case [920] if numbers and not any(math.isnan(self.at[axis]) for axis in numbers):
                 for axis, value in numbers.items():
-                    self.local[axis] = self.shifts[axis] = 0.0
+                    self.local[axis] = self.shifts[axis] = 0.0  # the place gets its number whatever was in force
                     self.shifts[axis] = self.at[axis] - value - self.offset(axis)
                 self.unsay(tuple(numbers))
-            case 921 if not values and not any(self.local.values()):
+            case [921] if not numbers and not any(self.local.values()):
                 self.shifts = {}
                 self.unsay()
-            case 1:
+            case _:
+                return False
+        self._other_words(line)
+        return True
+
+    def _shifted_frame(self, names: Sequence[str], values: Mapping[str, float]) -> bool:
+        """TRANS in place of what the program has shifted and turned, but for a tilted plane; ATRANS on top of it."""
+        tilted = self.turn is not None and self.turn.tilted
+        if self.counting or (self.tcp and not tilted) or not values.keys() <= self.at.keys():
+            return False
+        numbers = {axis: value * self.scale(axis) for axis, value in values.items()}
+        match names:
+            case ["TRANS"]:
                 if not tilted:
                     self.end_turn()
                 self.shifts = numbers
-            case 2:
-                for axis, value in numbers.items():
-                    self.shifts[axis] = self.shifts.get(axis, 0.0) + value
+            case ["ATRANS"]:
+                self.shifts |= {axis: self.shifts.get(axis, 0.0) + number for axis, number in numbers.items()}
             case _:
                 return False
-        if words:
-            self._other_words(line)
         return True
 
-    def _turned(self, line: TextLine, codes: Sequence[int]) -> bool:
-        """Take in a turn of the coordinates: G68, G68.2, G53.1, ROT, AROT or CYCLE800; False if it is none."""
-        names = [word.name for word in line.codes if word.name != "N"]
-        values = {word.name: word.value for word in line.path if not word.counted}
-        if self.lost or line.odd or self.beside or line.doubled() or len(values) < len(line.path):
+    def _turned(self, names: Sequence[str], codes: Sequence[int], values: Mapping[str, float]) -> bool:
+        """Take in G68 in its plane, G68.2 or G53.1 without other words; False if it is none."""
+        if names != ["G"] * len(codes):
             return False
-        if None in values.values():
-            return False
-        plain = {name: value or 0.0 for name, value in values.items()}
-        if self.family is Family.SINUMERIK:
-            return self._turned_frame(line, names, plain)
-        axes = PLANES[self.plane]
         match sorted(codes):
-            case [680] | [170, 680] | [680, 900] if names == ["G"] * len(codes) and not self.counting:
-                if values.keys() != {"R", *axes[:2]} or (170 in codes and self.plane != 17) or self.turn is not None:
+            case [680] | [170, 680] | [680, 900] if not self.counting and self.turn is None:
+                one, two, up = PLANES[self.plane]
+                if values.keys() != {"R", one, two} or (170 in codes and self.plane != 17):
                     return False
-                centre = {axis: self.offset(axis) + plain[axis] * self.unit for axis in axes[:2]}
-                self.begin_turn_about(turned((axes[2], plain["R"])), centre)
-            case [682] if names == ["G"] and values.keys() <= {*"XYZIJK"}:
-                turns = zip("ZXZ", (plain.get(letter, 0.0) for letter in "IJK"), strict=True)
-                self.begin_turn(turned(*turns), [plain.get(axis, 0.0) * self.unit for axis in "XYZ"], tilted=True)
-            case [531] if names == ["G"] and not values and self.turn is not None and self.turn.tilted:
+                centre = {axis: self.offset(axis) + values[axis] * self.unit for axis in (one, two)}
+                self.begin_turn_about(turned((up, values["R"])), centre)
+            case [682] if values.keys() <= {*"XYZIJK"}:
+                turns = zip("ZXZ", (values.get(letter, 0.0) for letter in "IJK"), strict=True)
+                self.begin_turn(turned(*turns), [values.get(axis, 0.0) * self.unit for axis in "XYZ"], tilted=True)
+            case [531] if not values and self.turn is not None and self.turn.tilted:
                 self.at |= self.square_to(self.turn.rotation)
                 self.forget_place()
             case _:
@@ -158,7 +159,7 @@ class WordAddressFollower(AxisFollower):
         return True
 
     def _turned_frame(self, line: TextLine, names: Sequence[str], values: Mapping[str, float]) -> bool:
-        """The same of SINUMERIK."""
+        """Take in ROT, AROT or CYCLE800; False if it is none."""
         angle = line.code("RPL")
         match sorted(names):
             case ["ROT" | "AROT" as name] if values.keys() <= {*"XYZ"}:
@@ -238,7 +239,7 @@ class WordAddressFollower(AxisFollower):
 
     def _modes(self, line: TextLine, codes: Sequence[int]) -> tuple[str, bool]:
         """Take in the codes of a block: why it has no motion that this reader knows, and whether it is in machine
-        coordinates.
+        coordinates or to a reference point.
         """
         apart, fixed, length_set = "", False, False
         self._other_words(line)
@@ -248,11 +249,11 @@ class WordAddressFollower(AxisFollower):
                     apart = "dwell"
                 case 530 | 1530:
                     fixed = True
+                case 280 | 300 if self.family is Family.WORDS:
+                    fixed = True
                 case 430 | 434 if self.family is Family.WORDS:
                     length_set = True
                     self._length_offset(line, code == 434)
-                case 280 | 300 if self.family is Family.WORDS:
-                    pass
                 case _ if self._took_mode(code) or self._took_system(code) or self._took_cycle(code) or code in QUIET:
                     pass
                 case _:
@@ -319,43 +320,52 @@ class WordAddressFollower(AxisFollower):
         return True
 
     def _other_words(self, line: TextLine) -> None:
+        """Take in the words that are no G codes and lead no axis."""
         if any(word.name in DECLARES for word in line.codes):
             return
         for word in line.codes:
-            name = word.name
-            if name == "F":
-                self.feed = None if word.value is None else word.value
-            elif name == "T":
-                self.next_tool = int(word.value) if word.value is not None else word.number.strip('"').upper()
-                if self.family is Family.SINUMERIK:
-                    self._change()
-            elif name == "M":
-                self.auxiliary(word)
-            elif name == "D" and self.family is Family.SINUMERIK:
-                self.choose_edge(word.value)
-            elif name in ("TRAORI", "TRAFOOF"):
-                self.lead(name == "TRAORI")
-                self.unsay()
-            elif name == "G" and word.value is None:
-                self.lost["G"] = "a G code is a formula"
-            elif name == "CYCLE800()" and not any(self.shifts.values()):
-                if self.turn is None or self.turn.tilted:
-                    self.end_turn()
-                else:
-                    self.lost["frame"] = "CYCLE800 in turned coordinates"
-            elif name == "MCALL":
-                if len(line.codes) - sum(each.name == "N" for each in line.codes) == 1:
-                    self.lost = {key: why for key, why in self.lost.items() if not CYCLES.match(key)}
-                    self.forget()
-                else:
-                    self.lost[name] = "a modal call"
-            elif len(name) > 1 and self.family is Family.SINUMERIK:
-                self.variables[name] = word.value
-                plain = name.partition("(")[0].strip()
-                if not WORDS_QUIET.fullmatch(plain) and not word.number and not name.startswith(("%", "_N_", "$")):
-                    self.lost[plain] = f"{plain} is not known to this reader"
-            elif name not in SINGLE and name != "G":
-                self.lost[name] = f"{name} is not known to this reader"
+            match word.name:
+                case "G" if word.value is None:
+                    self.lost["G"] = "a G code is a formula"
+                case "F":
+                    self.feed = word.value
+                case "T":
+                    self.next_tool = word.number.strip('"').upper() if word.value is None else int(word.value)
+                    if self.family is Family.SINUMERIK:
+                        self._change()
+                case "D" if self.family is Family.SINUMERIK:
+                    self.choose_edge(word.value)
+                case "M":
+                    self.auxiliary(word)
+                case "TRAORI" | "TRAFOOF" as name:
+                    self.lead(name == "TRAORI")
+                    self.unsay()
+                case "CYCLE800()" if not any(self.shifts.values()):
+                    if self.turn is None or self.turn.tilted:
+                        self.end_turn()
+                    else:
+                        self.lost["frame"] = "CYCLE800 in turned coordinates"
+                case "MCALL":
+                    self._modal_call(alone=[other.name for other in line.codes if other.name != "N"] == ["MCALL"])
+                case name if len(name) > 1:
+                    self._sinumerik_word(word)
+                case name if name not in SINGLE:
+                    self.lost[name] = f"{name} is not known to this reader"
+
+    def _modal_call(self, alone: bool) -> None:
+        """MCALL: alone it ends the modal call, and with that what was not followed because of it."""
+        if alone:
+            self.lost = {key: why for key, why in self.lost.items() if not CYCLES.match(key)}
+            self.forget()
+        else:
+            self.lost["MCALL"] = "a modal call"
+
+    def _sinumerik_word(self, word: TextWord) -> None:
+        """A variable that gets a value, or a word that does something."""
+        self.variables[word.name] = word.value
+        name = word.name.partition("(")[0].strip()
+        if not word.number and not WORDS_QUIET.fullmatch(name) and not name.startswith(("%", "_N_", "$")):
+            self.lost[name] = f"{name} is not known to this reader"
 
     def _change(self) -> None:
         """Another tool in the spindle of a SINUMERIK; its length holds at once where one was in force."""
@@ -421,9 +431,8 @@ class WordAddressFollower(AxisFollower):
         level = self.cycle.get("R", NAN)
         back = level
         if not self.returns_to_level and not level >= self.before_cycle:
-            back = (
-                NAN if self.returns_to_level is None else self.before_cycle
-            )  # the control has its own way at the start
+            # before G98 or G99 the control has its own way back
+            back = NAN if self.returns_to_level is None else self.before_cycle
         self.at = {**bottom, "Z": back}
         self.said["Z"] = self.said_before or back != self.before_cycle
         return step

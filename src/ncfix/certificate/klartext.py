@@ -50,14 +50,10 @@ class KlartextFollower(AxisFollower):
         if line.plain and line.path and not self.lost and not self.shortest and self._leads_straight(line):
             return self.straight(row, line)
         lead = line.codes[0].name if line.codes else ""
-        if not line.odd and self._took_statement(lead):
-            return None
-        if line.odd is RETRACTS:
-            return self.step(row, Kind.FEED, dict(self.at), line, RETRACTS)
         if line.odd:
-            if line.rest.strip():
-                self.lost["frame" if FRAMES.match(lead) else "odd"] = line.odd
-            return self.step(row, Kind.FEED, dict(self.at), line, line.odd) if line.path else None
+            return self._odd(row, line, lead)
+        if self._took_statement(lead):
+            return None
         self._klartext_words(line)
         if any(word.value is None for word in line.path):
             line = replace(line, path=[self._settled(word) for word in line.path])
@@ -68,13 +64,25 @@ class KlartextFollower(AxisFollower):
         if not words and line.word("PA") is None:
             return None
         if any(word.name == "M" and word.value in (91, 92) for word in line.codes):
-            end = self.target(words, machine=True)
-            if self.tcp or self.turn is not None:
-                end |= dict.fromkeys("XYZ", NAN)
-            step = self.step(row, Kind.FIXED, end, line)
-            self.unsay(tuple(words))
-            return step
+            return self._fixed(row, line, words)
         return self._path(row, line, lead, words)
+
+    def _odd(self, row: int, line: TextLine, lead: str) -> AxisStep | None:
+        """A line that cannot be taken apart; behind M140 an axis is followed again once it has its place."""
+        if line.odd is not RETRACTS and line.rest.strip():
+            self.lost["frame" if FRAMES.match(lead) else "odd"] = line.odd
+        if line.odd is not RETRACTS and not line.path:
+            return None
+        return self.step(row, Kind.FEED, dict(self.at), line, line.odd)
+
+    def _fixed(self, row: int, line: TextLine, words: Mapping[str, TextWord]) -> AxisStep:
+        """A motion in machine coordinates (M91, M92)."""
+        end = self.target(words, machine=True)
+        if self.tcp or self.turn is not None:
+            end |= dict.fromkeys("XYZ", NAN)
+        step = self.step(row, Kind.FIXED, end, line)
+        self.unsay(tuple(words))
+        return step
 
     def _took_statement(self, lead: str) -> bool:
         """Take in a line that says something of tools, units or the control of the tip; whether it is one."""
@@ -105,11 +113,9 @@ class KlartextFollower(AxisFollower):
     def _settled(self, word: TextWord) -> TextWord:
         """A word whose value is a position that the control has worked out, if that is known."""
         known = self.worked_out.get(word.number.lstrip("+-").upper())
-        return (
-            word
-            if word.value is not None or known is None
-            else word._replace(value=-known if word.number.startswith("-") else known)
-        )
+        if word.value is not None or known is None:
+            return word
+        return word._replace(value=-known if word.number.startswith("-") else known)
 
     def _tilt(self, lead: str) -> None:
         """PLANE SPATIAL or RESET: into a tilted plane, or out of it; with TURN and MOVE the rotary axes turn."""
@@ -195,23 +201,28 @@ class KlartextFollower(AxisFollower):
         if turn is not None:
             end |= self._turned_about_pole(turn)
         step = self.step(row, self.kind, end, line)
-        step.said = [self.said[axis] for axis in self.axes]
         if lead == "L" or step.why:
             return step
         if keys.isdisjoint(("DR+", "DR-")):
             step.why = "an arc without its sense"
-        elif lead == "CR":
-            radius = line.word("R")
-            if radius is not None and radius.value is not None:
-                return self.circle(step, {}, "DR-" in keys, radius.value * self.unit)
-            step.why = "an arc without a radius"
-        elif not {"X", "Y"} <= set(self.pole) or any(math.isnan(value) for value in self.pole.values()):
+            return step
+        if lead != "CR":
+            return self._arc_about_pole(step, turn, "DR-" in keys)
+        radius = line.word("R")
+        if radius is not None and radius.value is not None:
+            return self.circle(step, {}, "DR-" in keys, radius.value * self.unit)
+        step.why = "an arc without a radius"
+        return step
+
+    def _arc_about_pole(self, step: AxisStep, turn: TextWord | None, clockwise: bool) -> AxisStep:
+        """C to a place, or CP by an angle: that may be more than a turn."""
+        if any(math.isnan(self.pole.get(axis, NAN)) for axis in "XY"):
             step.why = NO_POLE
-        else:
-            step = self.circle(step, self.pole, "DR-" in keys, None)
-            if turn is not None and turn.value is not None:
-                step.sweep = math.radians(turn.value)
-                step.why = step.why or ("a helix of more than a turn" if abs(turn.value) > 360.0 else "")
+            return step
+        step = self.circle(step, self.pole, clockwise, None)
+        if turn is not None and turn.value is not None:
+            step.sweep = math.radians(turn.value)
+            step.why = step.why or ("a helix of more than a turn" if abs(turn.value) > 360.0 else "")
         return step
 
     def _leads_straight(self, line: TextLine) -> bool:
