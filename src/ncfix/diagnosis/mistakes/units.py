@@ -45,7 +45,8 @@ def in_usual_unit(measurements: Sequence[Measurement], machine: Machine, refused
     try:
         sensible(measurements, machine)
     except UsageError as refusal:
-        found = [] if UNIT_OF_VALUES in refused else _usual_units(tuple(measurements), machine)
+        told = all(each.kind == "axis" for each in measurements)  # what poses show may be that of another machine
+        found = _usual_units(tuple(measurements), machine) if told and UNIT_OF_VALUES not in refused else []
         found = [each for each in found if each.odds > found[0].odds - ALIKE]
         if not found:
             raise
