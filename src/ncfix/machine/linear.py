@@ -44,7 +44,7 @@ class Jacobians:
 
 def axis_jacobian(axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses) -> Array:
     """By the axis positions, poses last: (6, n_axes, n)."""
-    tip, joints = _in_workpiece_frame(axes, tool, poses, with_errors=False)
+    tip, joints = _in_workpiece_frame(axes, tool, poses, range(len(axes)), with_errors=False)
     columns = np.empty((6, len(axes), poses.positions.shape[1]))
     for index, axis in enumerate(axes):
         direction, point = joints[index][:, 0], joints[index][:, 1]
@@ -53,16 +53,16 @@ def axis_jacobian(axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses) -> Arra
     return columns
 
 
-def joint_jacobian(axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses) -> Array:
-    """By the error twists of the joints, poses last: (6, n_joints, 6, n)."""
-    tip, joints = _in_workpiece_frame(axes, tool, poses, with_errors=True)
-    columns = np.empty((6, len(axes) + 1, 6, poses.positions.shape[1]))
-    for index, own in enumerate(joints):
-        sign = -1.0 if index < len(axes) and axes[index].workpiece_side else 1.0
+def joint_jacobian(axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses, joints: Sequence[int]) -> Array:
+    """By the error twists of some joints, poses last: (6, n_joints, 6, n)."""
+    tip, vectors = _in_workpiece_frame(axes, tool, poses, joints, with_errors=True)
+    columns = np.empty((6, len(joints), 6, poses.positions.shape[1]))
+    for place, (joint, own) in enumerate(zip(joints, vectors, strict=True)):
+        sign = -1.0 if joint < len(axes) and axes[joint].workpiece_side else 1.0
         arm = tip - own[:, 3]
         for k in range(3):
-            columns[:, index, k] = sign * _shifting(own[:, k])
-            columns[:, index, 3 + k] = sign * _turning(own[:, k], arm)
+            columns[:, place, k] = sign * _shifting(own[:, k])
+            columns[:, place, 3 + k] = sign * _turning(own[:, k], arm)
     return columns
 
 
@@ -75,31 +75,32 @@ def _turning(direction: Array, arm: Array) -> Array:
 
 
 def _in_workpiece_frame(
-    axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses, with_errors: bool
+    axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses, joints: Sequence[int], with_errors: bool
 ) -> tuple[Array, list[Array]]:
-    """The tip (3, n), and the vectors of each joint (3, 2 or 4, n), the spindle last.
+    """The tip (3, n), and the vectors of each of these joints (3, 2 or 4, n); the spindle is the last joint.
 
     All of them are carried together, one growing bundle of columns: each joint adds its own where it stands.
     """
-    tip = np.moveaxis(tool.tip(poses.tool_length), -1, 0)[:, None, :]
+    bundle, weight = np.moveaxis(tool.tip(poses.tool_length), -1, 0)[:, None, :], np.ones((1, 1))
     size = 4 if with_errors else 2
     own_weight = np.eye(size)[:, -1:]  # of directions, and a point
-    spindle = columns(*BASE_AXES, tool.point) if with_errors else columns(ORIGIN, ORIGIN)
-    bundle, weight = _joined(tip, np.ones((1, 1)), spindle, own_weight)
-    order = [len(axes)]
+    order: list[int] = []
+    if len(axes) in joints:
+        bundle, weight = _joined(bundle, weight, columns(*BASE_AXES, tool.point), own_weight)
+        order.append(len(axes))
     for index in reversed(range(len(axes))):
         axis, position = axes[index], poses.positions[index]
-        own = _error_vectors(axis, position) if with_errors else columns(axis.direction, axis.point)
-        if axis.workpiece_side:
-            bundle, weight = _joined(bundle, weight, own, own_weight)
-            bundle = advance(axis, -position, bundle, weight)
-        else:
+        if not axis.workpiece_side:
             bundle = advance(axis, position, bundle, weight)
+        if index in joints:
+            own = _error_vectors(axis, position) if with_errors else columns(axis.direction, axis.point)
             bundle, weight = _joined(bundle, weight, own, own_weight)
-        order.append(index)
+            order.append(index)
+        if axis.workpiece_side:
+            bundle = advance(axis, -position, bundle, weight)
     bundle = np.broadcast_to(bundle, (3, bundle.shape[1], poses.positions.shape[1]))
     starts = {joint: 1 + size * place for place, joint in enumerate(order)}
-    return bundle[:, 0], [bundle[:, starts[joint] : starts[joint] + size] for joint in range(len(order))]
+    return bundle[:, 0], [bundle[:, starts[joint] : starts[joint] + size] for joint in joints]
 
 
 def _error_vectors(axis: Axis, position: Array) -> Array:
@@ -158,7 +159,8 @@ def design(
 ) -> Array:
     """See `Machine.design`; `shared` says how the effects depend on the state; poses last: (6, k, n)."""
     n = poses.positions.shape[1]
-    by_joint = joint_jacobian(axes, tool, poses)
+    joints = sorted({joint_index(axes, effect) for effect in effects})
+    by_joint = dict(zip(joints, np.moveaxis(joint_jacobian(axes, tool, poses, joints), 1, 0), strict=True))
     responses: dict[object, Array] = {}
     curves = [way.rows(poses) for way in shared.ways]
     ends = np.cumsum([0, *(len(curves[k]) for k in shared.own)]).tolist()
@@ -167,7 +169,7 @@ def design(
         seen = (effect.name, effect.reference, effect.carried)
         if seen not in responses:
             twist = np.broadcast_to(unit_twist(axes, tool, effect, poses), (6, n))
-            responses[seen] = np.einsum("ijn,jn->in", by_joint[:, joint_index(axes, effect)], twist)
+            responses[seen] = np.einsum("ijn,jn->in", by_joint[joint_index(axes, effect)], twist)
         np.multiply(responses[seen][:, None], curves[own], out=found[:, start:end])
     return found
 

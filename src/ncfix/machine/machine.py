@@ -329,7 +329,7 @@ class Machine:
         """Derivatives of the nominal tip pose by axis positions and by joint errors; see `Jacobians`."""
 
         def by_joints(chunk: Poses, _: slice) -> Array:
-            return linear.joint_jacobian(self.axes, self.tool, chunk)
+            return linear.joint_jacobian(self.axes, self.tool, chunk, range(len(self.axes) + 1))
 
         joints = self._evaluated(q, State(tool_length), None, by_joints, 6, len(self.axes) + 1, 6)
         return Jacobians(self.axis_jacobian(q, tool_length), joints)
