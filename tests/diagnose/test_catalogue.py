@@ -46,11 +46,11 @@ def test_a_scale_may_be_held_anywhere(world: World, held: float) -> None:
 def test_a_slide_tilts_by_nearly_the_slope(world: World, ratio: float) -> None:
     """A bow u^2 without its mean, and its slope 2 u times the ratio, are within one of the loadings."""
     sag, (low, high) = world.candidate("bed sag X"), world.data.measured.spans["X"]
-    assert [effect.name for effect in sag.effects[4:6]] == ["EZX", "EBX"]
+    assert [effect.name for effect in sag.effects[2:4]] == ["EZX", "EBX"]
     units = np.where([[effect.rotational] for effect in sag.effects], (high - low) / 2, 1.0)
     asked, rests = np.zeros((2, len(sag.effects), 5)), []
-    asked[:, 4, :3] = -1 / 3, 0.0, 1.0
-    asked[:, 5, 1] = 2 * ratio, -2 * ratio
+    asked[:, 2, :3] = -1 / 3, 0.0, 1.0
+    asked[:, 3, 1] = 2 * ratio, -2 * ratio
     for each in sag.loadings:
         span = orthonormal((units[..., None] * each.reshape(*asked.shape[1:], -1)).reshape(len(each), -1))
         rests += [without(span, coefficients.reshape(-1, 1)) for coefficients in asked]
@@ -74,15 +74,22 @@ WAVES = [("wCBXFZYSt", 1, 12.0), *([("wCBXFZYSt", 3, 6.0), ("wCAYFXZSt", 4, 20.0
 
 
 @pytest.mark.parametrize(("name", "seed", "size_um"), WAVES)
-def test_a_name_that_another_covers_is_never_sure(name: str, seed: int, size_um: float) -> None:
-    """One wave of EZC a turn is a sag and a face run-out: a run-out may have more waves, a sag grows with the load."""
+def test_a_name_that_another_covers_has_that_one_next_to_it(name: str, seed: int, size_um: float) -> None:
+    """One wave of EZC a turn is a sag and a face run-out: a run-out may have more waves, a sag grows with the load.
+
+    The noise decides which is likelier; of 30 other worlds by up to 8 log odds, so it may be named alone.
+    """
     world, random = World.of(name, seed, 100), np.random.default_rng(seed)
     turned = world.data.q[:, world.machine.axis_names.index("C")][world.data.row]
     wave = world.data.design([Effect("EZC", (0.0,))])[:, 0] * np.cos(turned - 0.7)
     shown = world.data.rms(wave)
     data = world.measured(wave * size_um / shown + world.clutter(random, 0.7), random)
-    (first,) = diagnose([data], world.machine).findings
-    assert {first.candidate.name, *first.aliases} == {"gravity sag C", "axial C"}
+    found = diagnose([data], world.machine)
+    (first,) = found.findings
+    others = found.selected.runners_up[first.candidate.name]
+    second, third, *_ = sorted(others, key=lambda each: -others[each])
+    assert {first.candidate.name, second} == {"gravity sag C", "axial C"}
+    assert others[third] < others[second] / 10
 
 
 def test_a_spindle_that_grows_may_be_a_frame_that_drifts_where_no_tool_turns() -> None:
