@@ -39,7 +39,7 @@ STAGES: dict[str, tuple[tuple[Any, str], ...]] = {
     "read the text (twice)": ((trace.PartReader, "read"), (reader, "read"), (block_delete, "read")),
     "follow it (twice)": ((trace.Follower, "follow"), (driver, "traced")),
     "plan: correct ends, judge the path between them, split": ((plain.Planner, "plan"),),
-    "plan, the long way": ((driver, "accepted_plan"), (solve, "accepted_plan")),
+    "plan, the long way": ((solve.Planning, "settled"),),
     "write: which words change, digits": ((driver, "written"),),
     "write, the long way": ((solve, "emit"),),
     "write: put the text together": ((driver, "spliced"),),

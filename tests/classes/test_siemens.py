@@ -71,7 +71,7 @@ ARCS = [
     case("tangential arc", "G1 X5 F100\nCT X10 Y5\nX15 Y2\nG1 X20", L3=R, L4=R, L5=R, L6=R),
     case("tangential arc that is a line", "G1 X5 F100\nCT X10\nY5\nG1 X20", L3=R, L4=R, L5=R, L6=R),
     case("tangential helix", "G1 X5 F100\nCT X10 Y5 Z40 TURN=1\nG1 X20", L3=R, L4=R, L5=R),
-    case("tangential arc after nobody knows what", "SUPA G1 Z1 F100\nCT X10 Y5 Z5\nG1 X20", L3=P, L4=N, L5=R),
+    case("tangential arc after nobody knows what", "SUPA G1 Z1 F100\nCT X10 Y5 Z5\nG1 X20", L2=N, L3=P, L4=N, L5=R),
     case("splines", "BSPLINE X5 Y5 F100\nX10\nG1 X20", L3=N, L4=N, L5=R),
     case("polynomials", "POLY PO[X]=(5,1) F100\nG1 X20 Y5 Z5", L3=N, L4=R),
     case("an arc of the tip", "TRAORI\nG2 X11 Y12 I10 J0 F100\nTRAFOOF\nG0 X1 Y1 Z50", L4=R, L6=R),

@@ -16,7 +16,6 @@ import numpy as np
 
 from ncfix.control.coordinates import INDEX, LETTERS, mask_of
 from ncfix.control.expressions import number
-from ncfix.control.flatten import NOT_FLAT
 from ncfix.control.flow import Call
 from ncfix.control.interpreter import RUNTIME, Interpreter
 from ncfix.control.moves import MotionEnd, MotionKind, Moves, Pass, Passing
@@ -274,6 +273,8 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             if self.in_parts:
                 raise NotInPartsError("a contour stands elsewhere in the program")
             if self.watcher is not None:
+                from ncfix.control.flatten import NOT_FLAT
+
                 raise RefusedError.of(NOT_FLAT, CONTOUR.format(turn.contour.name.upper()), self.place())
             mill_along(self.control, flow, turn.contour, turn.words, block, self.find, self.evaluate)
             return False

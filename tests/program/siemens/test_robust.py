@@ -104,4 +104,5 @@ ODD = {
 def test_odd_programs_are_followed_to_their_end(name: str, strategy: str, machine: Machine) -> None:
     program = read(f"{ODD[name]}\nM30\n".encode(), "part.mpf", "siemens")
     setup = replace(SETUP, initial={}, assume_zero=True)
-    assert fix_program(program, machine, setup, FixOptions(strategy=strategy, verify=False)).changed
+    fixed = fix_program(program, machine, setup, FixOptions(strategy=strategy, verify=False))
+    assert fixed.changed or fixed.report.refused  # what a refused CT begins from stays as it is
