@@ -360,11 +360,6 @@ def come_back(control: Sinumerik, turn: Turn, step: Calling) -> None:
         control.refuse_rest(RETURNS_ELSEWHERE)
 
 
-def contour(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """CYCLE62."""
-    contour_call(control, step)
-
-
 def measure(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """MEAS and MEAW without a value stand with a motion."""
     turn.special.add("meas")
@@ -377,7 +372,7 @@ SPECIAL: dict[str, Callable[[Sinumerik, Turn, Calling], None]] = {
     "mcall": modal_call,
     "def": define,
     "ret": come_back,
-    "cycle62": contour,
+    "cycle62": lambda control, _, step: contour_call(control, step),
     "meas": measure,
     "meaw": measure,
     **dict.fromkeys(ENDED_BY.keys() - {"trafoof"}, end_unfollowed),

@@ -226,7 +226,7 @@ class SinumerikWriter(BlockWriter):
         arguments, sunk = shifted(call, off, int(target.decimals[across]))
         if call.bound or self._is_inside_out(call, sunk):
             arguments, sunk = None, 0.0
-        if call.name.lower() in MILLING and not call.modal:
+        if call.points or call.led:
             position = self._placed(call, arguments)
         else:
             position = self._led_to(call, arguments) if call.modal else self._called(call, arguments)
@@ -273,7 +273,7 @@ class SinumerikWriter(BlockWriter):
     def _is_inside_out(self, call: CycleCall, sunk: float) -> bool:
         """Whether the hole would end on the other side of the height that its cycle counts from; where that moves with
         it, whether it would rise above that at which the cycle ends."""
-        first = int(MILLING[call.name.lower()].named) if call.name.lower() in MILLING else 0
+        first = int(bool(call.led))  # behind the name of a contour
         if (first + RFP, 1) in call.depths:
             clear, start, gap = (number_of(call, first + place) for place in (RTP, RFP, SDIS))
             return sunk > max(clear - start - gap, 0.0)

@@ -392,7 +392,9 @@ def diagnose(
             given = _explained(measurements, machine, refused)
         except UsageError:
             if undone.gap.given > AS_GOOD * undone.gap.floor:
-                wrong = in_usual_unit(measurements, machine, refused) or wrong
+                wrong = in_usual_unit(measurements, machine, refused)
+                if wrong is None:
+                    raise
                 undone = _explained(wrong.measurements, machine, refused)
             return _with_mistake(undone, wrong, machine)
         stretched = len(undone.data.y) * float(np.log(wrong.stretch))

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from ncfix.control.coordinates import LETTERS, mask_of, rotated
 from ncfix.control.expressions import number
 from ncfix.control.moves import CycleCall, MotionEnd, MotionKind, Pass, Passing
-from ncfix_siemens.sinumerik.cycles.milling import MILLING, OTHER_PLANE, PLANES, milling_of, said_in
+from ncfix_siemens.sinumerik.cycles.milling import MILLING, OTHER_PLANE, PLANES, digit, milling_of, said_in
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
@@ -186,7 +186,7 @@ def drilling_of(control: Sinumerik, step: Calling) -> Drilling:
 def digit_of(said: Sequence[float | str | None], place: int | None) -> int:
     """The last digit of an argument; zero where it is not given."""
     value = said[place] if place is not None and place < len(said) else None
-    return round(abs(value)) % 10 if isinstance(value, float) else 0
+    return digit(value) if isinstance(value, float) else 0
 
 
 def call_of(control: Sinumerik, drilling: Drilling, block: int, *, modal: bool) -> CycleCall:
@@ -199,8 +199,8 @@ def call_of(control: Sinumerik, drilling: Drilling, block: int, *, modal: bool) 
         fixed = fixed or ("" if control.stated else UNSTATED)
     plane, name = control.modal.plane, drilling.name.upper()
     points = tuple((place, plane.of(LETTERS)[axis]) for place, axis in drilling.points)
-    across, bound = LETTERS[plane.across], not drilling.sure and (modal or drilling.name not in MILLING)
     led = plane.of(LETTERS) if drilling.name in MILLING and MILLING[drilling.name].named else ()
+    across, bound = LETTERS[plane.across], not (drilling.sure or points or led)
     return CycleCall(name, drilling.values, drilling.depths, across, modal, fixed, bound, points, led)
 
 

@@ -101,7 +101,7 @@ class MillingCall:
 
     def digit(self, place: int, power: int = 0) -> int:
         """A digit of an argument: 0 the last one, 2 that of the hundreds; zero where the cycle has no such argument."""
-        return round(abs(self.numbers[place])) // 10**power % 10 if place > DP else 0
+        return digit(self.numbers[place], power) if place > DP else 0
 
     @property
     def bottom(self) -> tuple[float, tuple[int, ...], str]:
@@ -146,6 +146,11 @@ class MillingCall:
         u, v = far[0] / 2, far[1] / 2
         turn = math.radians(self.numbers[self.form.angle]) if self.form.angle else 0.0
         return x + u * math.cos(turn) - v * math.sin(turn), y + u * math.sin(turn) + v * math.cos(turn)
+
+
+def digit(value: float, power: int = 0) -> int:
+    """A digit of a number: 0 the last one before its point, 2 that of the hundreds."""
+    return round(abs(value)) // 10**power % 10
 
 
 def said_in(control: Sinumerik, step: Calling) -> tuple[tuple[float | str | None, ...], bool]:
