@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from measure.poses import machine
+from ncfix.diagnosis import diagnosis
 from ncfix.diagnosis.diagnosis import AMBIGUOUS, FOUND, NOTHING, Diagnosis, diagnose
+from ncfix.diagnosis.mistakes.mistake import Mistake
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Polynomial
@@ -134,3 +137,24 @@ def test_one_pose_without_time_or_warmth_is_refused():
     with pytest.raises(UsageError) as refused:
         diagnose([bare], known)
     assert refused.value.code == "NCF651"
+
+
+def test_a_refusal_stands_where_a_suspected_mistake_explains_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Values in their unit that contradict each other, and a mistake once undone that leaves as much."""
+    wrong = Mistake("sign of values", "", "", MILL, ())
+    far = SimpleNamespace(gap=SimpleNamespace(given=50.0, floor=1.0), findings=())
+    answers: Iterator[object] = iter((far, UsageError.of("NCF656", "the files contradict each other")))
+
+    def explained(*_: object) -> object:
+        answer = next(answers)
+        if isinstance(answer, UsageError):
+            raise answer
+        return answer
+
+    for name, given in (("find", wrong), ("in_usual_unit", None)):
+        monkeypatch.setattr(diagnosis, name, lambda *_, given=given: given)
+    for name in ("before", "bounded", "sensible"):
+        monkeypatch.setattr(diagnosis.checks, name, lambda given, *_: given)
+    monkeypatch.setattr(diagnosis, "_explained", explained)
+    with pytest.raises(UsageError, match="NCF656"):
+        diagnose([], MILL)
