@@ -394,13 +394,11 @@ class PartCorrector(Corrector):
 
     def _accepted_plan(self, continued: ContinuedPart) -> AcceptedPlan:
         """The plan of a part by the long way, as far as it does not depend on what the part before has left."""
-        part, task, head = continued.joined, self.task, None
-        if continued.head is not None:  # a guess
-            nowhere = np.zeros(len(part.moves.axes))
-            head = PrecedingMotion.steady(nowhere, continued.direction, nowhere).in_round(0)
-        direction = None if head is None else continued.direction
-        planning = Planning.of(part.moves, self.machine, task.dialect, task.options, direction, part.program.source)
-        return planning.accepted(head)
+        part, task = continued.joined, self.task
+        nowhere = np.zeros(len(part.moves.axes))
+        guess = None if continued.head is None else PrecedingMotion.steady(nowhere, continued.direction, nowhere)
+        planning = Planning.of(part.moves, self.machine, task.dialect, task.options, guess, part.program.source)
+        return planning.accepted(guess)
 
     def report(self, tally: Tally, suspicion: tuple[Message, ...]) -> FixReport:
         """The report of all parts."""

@@ -217,8 +217,9 @@ class AcceptedPlan:
         unchanged, shift = zip(*self.history, strict=True)
         return Round(np.array(unchanged), np.array(shift), position.copy())
 
-    def anew(self, head: Round | None) -> AcceptedPlan:
-        """Plan anew, what stays unchanged already and whatever has got a reason since; `head` as in `Planning`."""
+    def anew(self, before: PrecedingMotion | None, number: int) -> AcceptedPlan:
+        """Plan anew, in a round with this number, with what stays unchanged and whatever has got a reason since."""
+        head = None if before is None else before.in_round(number)
         return self.planning.settled(self.unchanged, self.reasons, head)
 
 
@@ -244,37 +245,38 @@ class Planning:
         machine: Machine,
         dialect: Dialect,
         options: FixOptions,
-        direction: Signs | None = None,
+        before: PrecedingMotion | None = None,
         source: bytes = b"",
     ) -> Planning:
         """For motions of a program.
 
-        direction  (n_axes,) in which the axes have come to the start, see `State`; None: not known
-        source     the text of the program, for a strategy that corrects rotary axes
+        before  what an earlier part left: in which direction the axes have come to the start
+        source  the text of the program, for a strategy that corrects rotary axes
         """
         language = language_of(dialect, WrittenLanguage)
         tolerance = PathTolerance(options.tolerance_mm, rounding(machine))
         return cls(
-            Intent(machine, moves, State() if direction is None else State(direction=direction)),
+            Intent(machine, moves, State() if before is None else State(direction=before.direction)),
             get_strategy(options.strategy),
             Requirements(tolerance, closure_of(dialect, moves), options.split_rapids, language.arc_pieces),
             None if language.held_angle is None else partial(language.held_angle, source),
         )
 
-    def accepted(self, head: Round | None = None, refused: Mapping[int, Reason] = NONE) -> AcceptedPlan:
+    def accepted(self, before: PrecedingMotion | None = None, refused: Mapping[int, Reason] = NONE) -> AcceptedPlan:
         """Plan until nothing speaks against it.
 
-        head     what the first motion was, where it is the last one of the part before
+        before   the last motion of the part before, where it is the first one here
         refused  blocks that are refused in any case, and why
         """
-        moves = self.intent.moves
+        moves, head = self.intent.moves, None if before is None else before.in_round(0)
         unchanged = np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL))
         return self.settled(unchanged, {**refused, **_by_rule(moves)}, head)
 
     def settled(self, unchanged: Mask, reasons: dict[int, Reason], head: Round | None) -> AcceptedPlan:
         """Plan until nothing speaks against it, where these motions (n,) and blocks stay unchanged from the beginning.
 
-        Motions, and the `reasons` of blocks, that have to stay besides are added.
+        `head` is what the first motion was, where it is the last one of the part before. Motions, and the `reasons` of
+        blocks, that have to stay besides are added.
         """
         moves, history, bound = self.intent.moves, list[tuple[bool, Array]](), np.zeros(len(unchanged), dtype=bool)
         while True:
@@ -332,9 +334,8 @@ def plan_and_write(
     refused  blocks that are refused whatever the plan is, and why
     """
     if first is None:
-        direction, head = (None, None) if before is None else (before.direction, before.in_round(0))
-        planning = Planning.of(moves, machine, program.dialect, options, direction, program.source)
-        first = planning.accepted(head, refused)
+        planning = Planning.of(moves, machine, program.dialect, options, before, program.source)
+        first = planning.accepted(before, refused)
     accepted, kinematics, rounds = first, kinematics_of(machine), list[Round]()
     while True:
         done = None if before is None else before.in_round(len(rounds)).position
@@ -359,7 +360,7 @@ def plan_and_write(
             raise AssertionError(f"blocks {sorted(emission.conflicts)} are unchanged and yet in conflict")
         for block, why in emission.conflicts.items():
             _explain(accepted.reasons, [block], CODE_OF_TEXT, why)
-        accepted = accepted.anew(None if before is None else before.in_round(len(rounds)))
+        accepted = accepted.anew(before, len(rounds))
 
 
 def _with_what_they_need(moves: Moves, unchanged: Mask, bound: Mask, reasons: dict[int, Reason]) -> tuple[Mask, bool]:

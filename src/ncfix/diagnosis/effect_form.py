@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import accumulate
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from ncfix.diagnosis.catalogue import Candidate
 from ncfix.measure.measurement import Array, Index
 from ncfix.values import frozen
 
+Real = TypeVar("Real", np.float32, np.float64)
 Blocks = list[tuple[Index, Index, Array]]
 """For each width: numbers of the groups, their columns (g, w), their inner products (g, w, w)."""
 
@@ -50,7 +52,7 @@ class EffectForm:
         return int(self.single.shape[1])
 
 
-def side_by_side(parts: Iterable[Array]) -> Array:
+def side_by_side(parts: Iterable[NDArray[Real]]) -> NDArray[Real]:
     """Columns (m, ...) of several beside one another, each column in one piece of memory."""
     return np.concatenate([part.T for part in parts]).T
 

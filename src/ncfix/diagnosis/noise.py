@@ -347,7 +347,7 @@ class PlainModel:
         best, found = LIKELY, None
         for start in range(0, len(some), TOGETHER):
             part = some[start : start + TOGETHER]
-            columns = np.concatenate([group.single.T for group in part]).T.astype(np.float64)
+            columns = side_by_side(group.single for group in part).astype(np.float64)
             columns *= LARGE / self.data.relative[:, None]
             inner = self._inner(dynamic, start, columns, column_bounds(part))
             odds = block_odds(inner, columns.T @ solved, less.T @ columns, total, count, self.data.sizes)
