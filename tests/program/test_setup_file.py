@@ -253,6 +253,13 @@ def test_offsets_of_fanuc_as_a_program(tmp_path: Path) -> None:
     assert table(tmp_path, "OFFSET.TXT", text) == {1: Tool(pytest.approx(120.48))}
 
 
+@pytest.mark.parametrize("block", ["G10 G90 L10 P1 R120.5", "g10p1l10r120.5", "N7 G90 G10 L10 R120.5 P001;"])
+def test_offsets_of_fanuc_in_any_order_of_words(tmp_path: Path, block: str) -> None:
+    assert table(tmp_path, "OFFSET.TXT", f"%\nG10 G90 L2 P1 X-310.5\n{block}\n%\n") == {1: Tool(120.5)}
+    with pytest.raises(ConfigError, match=r":4: NCF385: G91: adds"):
+        table(tmp_path, "OFFSET.TXT", f"%\n{block}\n%\nG10 G91 L10 P2 R1.\n")
+
+
 @pytest.mark.parametrize(("unit", "scale"), [("", 1.0), ("G21\n", 1.0), ("G20 G90\n", 25.4)])
 def test_offsets_of_fanuc_among_settings_and_notes(tmp_path: Path, unit: str, scale: float) -> None:
     text = f"%\nO9999 (OFFSETS)\n{unit}G90\nG10 L2 P1 X-310.5 Y-94. Z0 (G54)\nG10 L10 P1 R4.5 (T1 - DRILL)\n"

@@ -37,11 +37,9 @@ TURNING = range(500, 600)
 BESIDES = {"ADP": "adapters of tools", "SCP": "sum offsets", "ECP": "set-up offsets"}
 """$TC_ that lengthen a tool besides its $TC_DP."""
 
-OFFSET = re.compile(
-    rf"(?:N\d+)?(?:G9(?P<way>[01]))?G10(?:L(?P<kind>\d+))?P(?P<number>\d+)R(?P<value>{NUMBER});?", re.IGNORECASE
-)
+WORD = re.compile(rf"([A-Z])({NUMBER})")
 AROUND = re.compile(
-    r"(?:N\d+)?(?:[O:]\d+|(?:G(?:90|20|21|17|40|49|80|94))+|(?:G90)?G10L(?:2|20)P.*|M(?:0?2|30|99))", re.IGNORECASE
+    r"(?:N\d+)?(?:[O:]\d+|(?:G(?:90|20|21|17|40|49|80|94))+|(?:G90)?G10(?:G90)?L(?:2|20)P.*|M(?:0?2|30|99))"
 )
 """Blocks among tool offsets that change none: a program's number, settings, work offsets, its end."""
 INCHES = {"G20": INCH, "G21": 1.0}
@@ -89,15 +87,28 @@ def tool_data_rows(text: str, scale: float) -> Iterator[Row]:
 
 def is_offsets(text: str) -> bool:
     """Whether a text has tool offsets as G10 writes them."""
-    return any(OFFSET.fullmatch(block) for _, block in _blocks(text))
+    return any(_offset(block) for _, block in _blocks(text))
 
 
 def _blocks(text: str) -> Iterator[tuple[int, str]]:
-    """The blocks of a program with their lines, without comments, blanks and marks of its ends."""
+    """The blocks of a program with their lines, in upper case, without comments, blanks and marks of its ends."""
     for line, row in enumerate(text.splitlines(), 1):
-        plain = "".join(re.sub(r"\([^)]*\)?", "", row).split()).strip("%;")
+        plain = "".join(re.sub(r"\([^)]*\)?", "", row).split()).strip("%;").upper()
         if plain:
             yield line, plain
+
+
+def _offset(block: str) -> dict[str, str]:
+    """The values of L, if it is there, P and R of a block that sets an offset, in any order, and of `G`, G90 or G91, if
+    that is there; empty of another block.
+    """
+    words = WORD.findall(block)
+    codes = sorted(value for letter, value in words if letter == "G")
+    found = [(letter, value) for letter, value in words if letter not in "GN"]
+    whole = "".join(map("".join, words)) == block and codes in (["10"], ["10", "90"], ["10", "91"])
+    if not whole or sorted(letter for letter, _ in found) not in (["P", "R"], ["L", "P", "R"]):
+        return {}
+    return dict(found) | {"G": code for code in codes[1:]}
 
 
 def offset_rows(text: str, scale: float) -> Iterator[Row]:
@@ -106,21 +117,21 @@ def offset_rows(text: str, scale: float) -> Iterator[Row]:
     units: set[float] = set()
     for line, plain in _blocks(text):
         if AROUND.fullmatch(plain):
-            units |= {INCHES[code] for code in re.findall(r"G2[01](?!\d)", plain.upper())}
+            units |= {INCHES[code] for code in re.findall(r"G2[01](?!\d)", plain)}
             continue
-        match = OFFSET.fullmatch(plain)
-        kind = int(match["kind"] or OLD) if match else 0
-        if match is None or kind not in (GEOMETRY, WEAR, OLD, *ACROSS):
+        words = _offset(plain)
+        kind = float(words.get("L", OLD)) if words else 0
+        if kind not in (GEOMETRY, WEAR, OLD, *ACROSS) or not words["P"].isdecimal():
             yield line, "is not understood: tool offsets are written as G10 L10 P1 R120.5, with L10 to L13"
-        elif match["way"] == "1":
+        elif words.get("G") == "91":
             yield line, "G91: adds to a value that is not here"
-        elif "." not in match["value"] and float(match["value"]):
+        elif "." not in words["R"] and float(words["R"]):
             yield line, "a value without a decimal point: nobody says in which increments it counts"
         elif kind not in ACROSS:
-            key = int(match["number"]), WEAR if kind == OLD else kind
+            key = int(words["P"]), WEAR if kind == OLD else int(kind)
             if key in found:
                 yield line, f"offset {key[0]} has two values"
-            found[key] = line, float(match["value"])
+            found[key] = line, float(words["R"])
     if len(units) > 1:
         yield 0, "G20 and G21 in one file"
     scale = min(units, default=scale)
