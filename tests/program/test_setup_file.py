@@ -78,7 +78,7 @@ most_blocks = 0
         (7, "NCF382", "tools.4.lenght: unknown key 'lenght'", "did you mean 'length'?"),
         (8, "NCF382", "initial.Q: no axis letter", "they are X Y Z A B C U V W"),
         (9, "NCF383", "workpiece_offset: expected a list of 3 numbers, found a list of 2", ""),
-        (10, "NCF382", "references.G29: no reference point", "they are G28 and G30"),
+        (10, "NCF382", "references.G29: no reference point", "they are G28, G30 and M92"),
         (10, "NCF383", "references.G29.X: inf is not a finite number", ""),
         (11, "NCF382", "variables.depth: no parameter", 'they are written "#100" or "#<name>"'),
         (12, "NCF383", "tcp: expected true or false, found 1", ""),

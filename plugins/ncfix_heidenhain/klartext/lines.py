@@ -6,7 +6,7 @@ Source: TNC 640, "Programming: contours", "Multiple axis machining", "Miscellane
 import math
 from collections.abc import Sequence
 
-from ncfix.control.coordinates import LETTERS, Vector, dot, mask_of
+from ncfix.control.coordinates import DEGREE, LETTERS, Vector, dot, mask_of
 from ncfix.control.frames import unit
 from ncfix.control.moves import Motion, MotionEnd, MotionKind, Pass, Passing, UnknownAxes
 from ncfix.control.posture import WayRules
@@ -26,7 +26,7 @@ from ncfix_heidenhain.klartext.targets import (
 from ncfix_heidenhain.klartext.transformations import check_normal
 
 MACHINE_COORDINATES = "machine coordinates ({})"
-NOT_GIVEN = "where the axis {} stands after M92 depends on a datum of the machine that is not given"
+NOT_GIVEN = "where the axis {} stands after M92 depends on its zero point, which is not given (references.M92 in the setup file)"
 NOT_STRAIGHT = "where the axis {} stands after a path other than L in machine coordinates is not followed"
 SQUARE = "the control turns the tool square to the surface (NX NY NZ under M128), and where to is not worked out"
 ORIENTED = "the control works out the rotary axes (TX TY TZ), and what it finds is not known"
@@ -168,7 +168,10 @@ def at_machine(control: KlartextControl, step: Step) -> None:
     """A motion in machine coordinates: M91, or M92."""
     code, (axes, unsure) = "M91" if 91 in step.codes else "M92", in_machine(control, step.words)
     if code == "M92":
-        unsure |= dict.fromkeys(axes, NOT_GIVEN)
+        zero = control.setup.references.get(code, {})
+        unsure |= {index: NOT_GIVEN for index in axes if LETTERS[index] not in zero}
+        for index in axes.keys() - unsure.keys():
+            axes[index] += zero[LETTERS[index]] * (DEGREE if control.rotary[index] else 1.0)
     if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():
         elsewhere = dict.fromkeys((i for i in control.machine if not control.rotary[i]), NOT_STRAIGHT)
         axes, unsure = dict.fromkeys(elsewhere, 0.0) | axes, unsure | elsewhere

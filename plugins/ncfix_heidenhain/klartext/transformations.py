@@ -454,7 +454,8 @@ def turn_axes(control: KlartextControl, way: dict[int, float] | None) -> None:
         switch(control, control.tools.vector, False, control.tools.offset)
         control.refresh()
     if way is None:
-        control.pass_here(TURNED, POSITIONED, "".join(LETTERS[index] for index in control.turning))
+        why = next((control.unknown[index] for index in control.turning if index in control.unknown), POSITIONED)
+        control.pass_here(TURNED, why, "".join(LETTERS[index] for index in control.turning))
         return
     target, unknown = control.position[:], {k: why for k, why in control.unknown.items() if k not in way}
     for index, angle in way.items():

@@ -63,8 +63,9 @@ class KlartextFollower(AxisFollower):
             return None
         if not words and line.word("PA") is None:
             return None
-        if any(word.name == "M" and word.value in (91, 92) for word in line.codes):
-            return self._fixed(row, line, words)
+        machine = [word.value for word in line.codes if word.name == "M" and word.value in (91, 92)]
+        if machine:
+            return self._fixed(row, line, words, self.given.references.get("M92", {}) if 92 in machine else None)
         return self._path(row, line, lead, words)
 
     def _odd(self, row: int, line: TextLine, lead: str) -> AxisStep | None:
@@ -75,9 +76,13 @@ class KlartextFollower(AxisFollower):
             return None
         return self.step(row, Kind.FEED, dict(self.at), line, line.odd)
 
-    def _fixed(self, row: int, line: TextLine, words: Mapping[str, TextWord]) -> AxisStep:
-        """A motion in machine coordinates (M91, M92)."""
+    def _fixed(
+        self, row: int, line: TextLine, words: Mapping[str, TextWord], zero: Mapping[str, float] | None
+    ) -> AxisStep:
+        """A motion in machine coordinates; M92 counts from `zero`, as far as that is given."""
         end = self.target(words, machine=True)
+        if zero is not None:
+            end |= {axis: end[axis] + zero.get(axis, NAN) for axis in words if axis in end}
         if self.tcp or self.turn is not None:
             end |= dict.fromkeys("XYZ", NAN)
         step = self.step(row, Kind.FIXED, end, line)

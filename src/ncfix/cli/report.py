@@ -59,7 +59,8 @@ def report(
     context = click.get_current_context()
     named = [name for name in context.params if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
     if set(named) - {"sources", "output", "force"}:
-        raise click.UsageError("options of a program need -m MACHINE")
+        hint = "a project file is not looked for here: `ncfix fix PROGRAM --report FILE.html` takes what it says"
+        raise UsageError.of("NCF001", "options of a program need -m MACHINE", hint=hint)
     from ncfix.reports.document import Document
     from ncfix.reports.rendering import form_of
 

@@ -60,7 +60,7 @@ class Setup:
     tools             tool number -> `Tool`; tool 0 is what is in the spindle when the program starts
     named_tools       tools that are called by name, in upper case; a further cutting edge has its D number after it
     initial           axis letter -> start position, machine axes, mm or degree
-    references        "G28" | "G30" -> axis letter -> machine position
+    references        "G28" | "G30", and "M92", from which M92 counts -> axis letter -> machine position
     variables         "#100", "#<name>", "R1" or "NAME" -> value
     inputs            what the errors of the machine depend on besides its axes: "temp_spindle" -> 24.5
     workpiece_offset  origin of the workpiece frame in the base frame with all axes at zero, mm

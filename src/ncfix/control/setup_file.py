@@ -178,7 +178,7 @@ READERS: dict[str, Callable[[TomlTable, str], Any]] = {
     "work_offsets": _each(SYSTEM, "no work offset", "they are G54 ... G59.3, and G54.1P1 ...", _offset),
     "tools": _tools,
     "initial": _position,
-    "references": _each(re.compile("G28|G30"), "no reference point", "they are G28 and G30", _position),
+    "references": _each(re.compile("G28|G30|M92"), "no reference point", "they are G28, G30 and M92", _position),
     "variables": _each(VARIABLE, "no parameter", 'they are written "#100" or "#<name>"', TomlTable.number),
     "inputs": _each(re.compile(".*", re.DOTALL), "", "", TomlTable.number),
     "workpiece_offset": lambda root, key: root.numbers(key, count=3),

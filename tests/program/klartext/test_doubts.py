@@ -217,7 +217,19 @@ def test_an_axis_that_is_led_nowhere_known_in_machine_coordinates_says_why() -> 
     """Under M128 all of X Y Z are unknown then; of Z the program has said more than that the kinematics are."""
     body = "L X+0 Y+0 Z+50 C+30 FMAX M128\nL Z+5 FMAX M92\nL X+1 Y+1 F100"
     moves = follow(body, "XYZC").moves
-    assert moves.reasons[moves.reason[-1]].startswith("where the axis Z stands after M92 depends on a datum")
+    assert moves.reasons[moves.reason[-1]].startswith("where the axis Z stands after M92 depends on its zero point")
+
+
+def test_m92_counts_from_the_zero_point_of_the_setup() -> None:
+    body = "L X+0 Y+0 Z+5 C+0 FMAX\nL Z+10 C+20 FMAX M92\nL X+1 Y+1 FMAX\nL Z-1 F100"
+    moves = follow(body, "XYZC", references={"M92": {"Z": 200.0, "C": -50.0}}).moves
+    assert moves.end[1:3, 2:].tolist() == [[210.0, pytest.approx(np.radians(-30.0))]] * 2
+
+
+def test_a_plane_that_turns_axes_from_an_unknown_place_says_why_that_is_unknown() -> None:
+    body = "L X+0 Y+0 Z+5 FMAX\nL A+0 C+0 FMAX M92\nPLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX\nL X+1 Y+1 Z+0 F100"
+    moves = follow(body, "XYZAC").moves
+    assert moves.reasons[moves.reason[-1]].startswith("where the axis A stands after M92 depends on its zero point")
 
 
 def test_m140_beside_words_of_axes() -> None:
