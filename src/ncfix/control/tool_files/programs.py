@@ -108,7 +108,7 @@ def _offset(block: str) -> dict[str, str]:
     whole = "".join(map("".join, words)) == block and codes in (["10"], ["10", "90"], ["10", "91"])
     if not whole or sorted(letter for letter, _ in found) not in (["P", "R"], ["L", "P", "R"]):
         return {}
-    return dict(found) | {"G": code for code in codes[1:]}
+    return dict([*found, *(("G", code) for code in codes[1:])])
 
 
 def offset_rows(text: str, scale: float) -> Iterator[Row]:
