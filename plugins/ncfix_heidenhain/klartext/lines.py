@@ -26,7 +26,7 @@ from ncfix_heidenhain.klartext.targets import (
 from ncfix_heidenhain.klartext.transformations import check_normal
 
 MACHINE_COORDINATES = "machine coordinates ({})"
-NOT_GIVEN = "where the axis {} stands after M92 depends on its zero point, which is not given (references.M92 in the setup file)"
+NOT_GIVEN = "where the axis {} stands after M92 depends on its zero point (references.M92 in the setup)"
 NOT_STRAIGHT = "where the axis {} stands after a path other than L in machine coordinates is not followed"
 SQUARE = "the control turns the tool square to the surface (NX NY NZ under M128), and where to is not worked out"
 ORIENTED = "the control works out the rotary axes (TX TY TZ), and what it finds is not known"
