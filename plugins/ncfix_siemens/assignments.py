@@ -130,7 +130,8 @@ def assignments(lines: Iterable[FileRow], remarks: Remarks) -> Iterator[ArrayAss
     if found and HEADER.fullmatch(found[first].text.strip()):
         rest = iter(found[first + 1 :])
     else:
-        remarks.doubt(1, "the first line does not name the file", "%_N_NC_CEC_INI or %_N_AX1_EEC_INI, as the control archives it")
+        hint = "%_N_NC_CEC_INI or %_N_AX1_EEC_INI, as the control archives it"
+        remarks.doubt(1, "the first line does not name the file", hint)
         rest = iter(found)
     ended = False
     for line in rest:
