@@ -47,7 +47,7 @@ def test_offsets(option: str, offsets: dict[str, dict[str, float]]) -> None:
 
 
 def test_tools_and_start() -> None:
-    setup = given("--tool", "12=120.0", "--tool", "3=80,5", "--initial", "X=0,z=300", "--assume-zero").load()
+    setup = given("--tool", "12=120.0", "--tool", "3=80.0,5", "--initial", "X=0,z=300", "--assume-zero").load()
     assert setup.tools == {12: Tool(120.0), 3: Tool(80.0, 5.0)}
     assert setup.initial == {"X": 0.0, "Z": 300.0}
     assert setup.assume_zero
@@ -69,6 +69,7 @@ def test_start_positions_may_be_given_one_by_one_as_messages_ask_for_them() -> N
         (["--offset", "G54=nan"], "'nan' is not a number"),
         (["--tool", "T12=3"], "not a tool number"),
         (["--tool", "12=1,2,3"], "a length"),
+        (["--tool", "12=120,5"], "decimal comma: 120.5 is a length, 120.0,5.0 a length and a radius"),
         (["--tool", "12=inf"], "'inf' is not a number"),
         (["--initial", "X0"], "not an axis and a number"),
         (["--initial", "XY=0"], "not an axis and a number"),

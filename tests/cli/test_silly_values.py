@@ -137,11 +137,13 @@ def test_tables_are_written_all_or_not_at_all(shop: Shop, ncfix: Ncfix, monkeypa
     assert list((shop.folder / "tables").iterdir()) == []
 
 
-@pytest.mark.parametrize(("offset", "code"), [("0,0,60,0,10", 2), ("0,0,60,0,10,0", 0), ("Z60,C10", 0)])
+@pytest.mark.parametrize(
+    ("offset", "code"), [("0,0,60,0,10", 2), ("0,0,60,0,10,0", 2), ("0,0,60,0,0,10", 0), ("Z60,C10", 0)]
+)
 def test_a_work_offset_in_the_order_of_the_axes_of_a_machine_is_refused(
     offset: str, code: int, ncfix: Ncfix, root: Path
 ) -> None:
-    """X Y Z A C of a machine without B: the fifth number is B."""
+    """X Y Z A C of a machine without B: the fifth number is B. Six may be three with decimal commas."""
     guide = root / "examples" / "guide"
     given = ("--setup", guide / "setup.toml", "--offset", f"G54={offset}")
     result = ncfix("check", guide / "shop" / "bracket.nc", "-m", guide / "mill.toml", *given)

@@ -80,6 +80,9 @@ def tool_values(name: str, text: str) -> tuple[float, ...]:
     values = tuple(map(number, text.split(",")))
     if len(values) > 2:
         raise ValueError("a length, and a radius if wanted")
+    if len(values) == 2 and "." not in text:
+        one, both = text.replace(",", "."), text.replace(",", ".0,")
+        raise ValueError(f"{text!r} may have a decimal comma: {one} is a length, {both}.0 a length and a radius")
     return values
 
 
@@ -258,7 +261,7 @@ class SetupOptions:
             block_skip=setup.block_skip if stated is None else None if isinstance(stated, str) else stated,
         )
         if machine is not None:
-            check_offsets(whole, machine.axis_names)
+            check_offsets(whole, machine.axis_names, {name for name, _ in self.offsets})
         return whole
 
 

@@ -323,7 +323,8 @@ CODES: dict[str, Code] = {
     ),
     "NCF384": Code(
         "Work offset in the order of the machine's axes",
-        "A list of numbers gives X Y Z A B C in this order, so the fifth is B, also on a machine with A and C.",
+        "A list of numbers gives X Y Z A B C in this order, so the fifth is B, also on a machine with A and C. Numbers "
+        "have decimal points: 1,5,2,5,3,5 are six.",
         "Name the axes: G54 = { Z = 60, C = 10 }, or --offset G54=Z60,C10.",
     ),
     "NCF385": Code(

@@ -99,18 +99,21 @@ class Setup:
         return self.named_tools.get(name.upper()) or (self.tools.get(int(name)) if name.isdecimal() else None)
 
 
-def check_offsets(setup: Setup, axes: Collection[str]) -> None:
+def check_offsets(setup: Setup, axes: Collection[str], typed: Collection[str] = ()) -> None:
     """Refuse work offsets whose numbers seem to be in the order of the machine's axes. Raises `UsageError` NCF384.
 
     The order is X Y Z A B C on any machine. Where an axis that the machine lacks has a number that is not zero, and one
-    of its axes further on has none, the number was meant for that one. Numbers of other axes are not used.
+    of its axes further on has none, the number was meant for that one. Numbers of other axes are not used, but of
+    offsets that were typed for this machine: 1,5,2,5,3,5 may be three numbers with decimal commas.
     """
     for system, values in setup.work_offsets.items():
         for letter, value in values.items():
             behind = LETTERS[LETTERS.index(letter) + 1 :]
-            if value and letter not in axes and any(axis in axes and axis not in values for axis in behind):
+            meant = system in typed or any(axis in axes and axis not in values for axis in behind)
+            if value and letter not in axes and meant:
                 text = f"work offset {system}: {letter} is {value:g}, and the machine has no axis {letter}"
-                hint = f"numbers are {' '.join(LETTERS)} on any machine; or name the axes: {system} = {{ Z = 60 }}"
+                hint = f"numbers are {' '.join(LETTERS)} on any machine, with decimal points; or name the axes: "
+                hint += f"--offset {system}=Z60" if system in typed else f"{system} = {{ Z = 60 }}"
                 raise UsageError.of("NCF384", text, hint=hint)
 
 
