@@ -63,6 +63,10 @@ WORKED: dict[str, tuple[str, list[list[float]]]] = {
     ),
     "indirect variables": ("#1=101\n#101=7.\n#[#1+1]=8.\nG0X#[#1]Y##1Z#102", [[7, 7, 8]]),
     "variables on the left side in one block": ("#1=2.\n#1=#1*#1\nG0X#1", [[4, 0, 0]]),
+    "two letters of a control word": (
+        "#1=0\nWH[#1LT2]DO1\n#1=#1+1\nEN1\nIF[#1EQ2]TH#2=7.\nGO9\n#1=5\nN9G0X#1Y#2",
+        [[2, 7, 0]],
+    ),
     "ROUND in a word rounds to the least increment": ("#1=1.23456\nG0X[ROUND[#1]]Y#1", [[1.235, 1.23456, 0]]),
     "arguments of a macro": (
         "G65P9010A1.B2.C3.\nG0X#1Y5.\nM30\nO9010\nG0X#1Y#2Z#3\nM99",
