@@ -117,7 +117,9 @@ class MacroBuilder(TreeBuilder):
     def statement(self, tree: Branch, keyword: str) -> OWordLine:
         """A control statement: what it tests, and where it leads."""
         branches = [node for node in tree.children if not isinstance(node, Token)]
-        label: str | Expression = next((str(int(str(n))) for n in tree.children if is_label(n)), "")
+        label: str | Expression = next(
+            (str(int(str(n))) for n in tree.children if isinstance(n, Token) and kind(n) == "LABEL"), ""
+        )
         tests = branches[:1] if keyword in ("if goto", "if then", "do") else []
         if not label and len(branches) > len(tests):
             label = self.expression(branches[-1])
@@ -133,11 +135,6 @@ class MacroBuilder(TreeBuilder):
 
 STATEMENTS = {"branch": "if goto", "condition": "if then", "jump": "goto", "loop": "do", "loop_end": "end"}
 """Rules of the grammar and the keywords that they get."""
-
-
-def is_label(node: Node) -> bool:
-    """Whether a node is a number that says where to go, and belongs to the shape."""
-    return isinstance(node, Token) and kind(node) == "LABEL"
 
 
 # -- corners that the control rounds or breaks -------------------------------------------------------------------------

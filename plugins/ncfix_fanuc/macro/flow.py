@@ -36,11 +36,6 @@ AFTER = "where the axis {{}} stands after the program O{label}, which is not at 
 TAKEN = "the program O{label} is not at hand, and is taken to leave offsets, tool lengths and modal codes as they are"
 
 
-def is_builders(label: str) -> bool:
-    """Whether a number is one of those that are locked in the control."""
-    return label.isdigit() and int(label) in LOCKED
-
-
 def ran(control: MacroControl, label: str) -> None:
     """Such a program has run."""
     control.warn(
@@ -269,7 +264,7 @@ class MacroFlow(ProgramFlow[RS274Unit]):
         try:
             entry = self.entry(label)
         except Fault as fault:
-            if fault.code != NO_SUBPROGRAM or not is_builders(label):
+            if fault.code != NO_SUBPROGRAM or not (label.isdigit() and int(label) in LOCKED):
                 raise
             ran(self.control, label)
             return None

@@ -74,8 +74,8 @@ class MacroInterpreter(RS274Interpreter):
         """Give the control its own variables; where execution begins."""
         control = self.control
         control.parameters.persistent = lambda number: None
-        control.parameters.live = system.getters(control)
-        control.parameters.position = self.position_read
+        control.parameters.live = system.positions(control) | system.modes(control) | system.offsets(control)
+        control.parameters.position = lambda number: control.position_is_read(f"#{number}")
         control.parameters.unset = self.not_set
         control.parameters.inherits = is_called(self.main.program)
         control.coming = self.coming
@@ -106,10 +106,6 @@ class MacroInterpreter(RS274Interpreter):
         control = self.control
         special = control.polar is not None or control.scaling is not None or control.vectors or control.entering
         return super().lane_is_open(plan) and not (special or self.modal_calls or self.cornered)
-
-    def position_read(self, number: int) -> None:
-        """The program reads where the machine stands, which compensation changes."""
-        self.control.position_is_read(f"#{number}")
 
     # -- one block ----------------------------------------------------------------------------------------------------
 
@@ -142,14 +138,9 @@ class MacroInterpreter(RS274Interpreter):
         self.control.whole = False
         if ANGLE in plan.letters:
             self.control.refusal = refusal
-            self.note_angle(plan)
+            plane = self.control.modal.plane  # the coordinate that the block leaves out is not followed
+            self.control.lose([i for i in plane.pair if LETTERS[i] not in plan.letters], AFTER_ANGLE)
         return ended
-
-    def note_angle(self, plan: RS274Plan) -> None:
-        """A line given by its angle (,A): the coordinate that its block leaves out is not followed."""
-        plane = self.control.modal.plane
-        missing = [index for index in plane.pair if LETTERS[index] not in plan.letters]
-        self.control.lose(missing, AFTER_ANGLE)
 
     def without_vacant(self, plan: RS274Plan) -> RS274Plan:
         """The plan without the words whose value is a vacant variable: they count as not written."""

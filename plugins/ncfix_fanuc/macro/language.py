@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.text.language import BulkLayout
 from ncfix.text.layout import CENTRE_LETTERS, BlockWords, Layout
-from ncfix.text.shapes import Scan, scan
+from ncfix.text.shapes import scan
 from ncfix.text.spelling import Spelling
 from ncfix.text.tree import Literal, OWordLine, Program, Template
 from ncfix.writer.pieces import Pieces
@@ -41,11 +42,6 @@ def runs_straight_on(template: Template) -> bool:
     flows = [item.keyword for item in template.items if isinstance(item, OWordLine)]
     free = ELSEWHERE.isdisjoint(template.m_codes) and CORNER.isdisjoint(letters_of(template))
     return free and all(keyword == "program" for keyword in flows)
-
-
-def scanned(source: bytes, blocks: NDArray[np.int64]) -> Scan:
-    """The shapes of blocks, in which numbers with and without a decimal point differ."""
-    return scan(source, blocks, pointless=True)
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
@@ -78,7 +74,7 @@ def layout(program: Program, block: int) -> Layout | None:
 
 FANUC: WrittenLanguage = replace(
     RS274,
-    scan=scanned,
+    scan=partial(scan, pointless=True),
     parse=parse_block,
     control=lambda run, dialect: MacroControl(run, dialect, RULES[dialect.semantics]),
     interpreter=MacroInterpreter,

@@ -62,8 +62,10 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
         take_number(control, block)
         if control.modal.plane.across != Z:
             control.warn(AXES_SAID, ALONG_Z, "check along which axis it acts (Fanuc: parameter 5001 TLB)")
-        if code in TIP_CONTROL:
-            note_turned(control)
+        turned = any(abs(control.position[i]) > NOTHING for i in control.turning)
+        if code in TIP_CONTROL and not control.tcp and turned:
+            hint = "switch G43.4 on with the rotary axes at zero, or check the parameters"
+            control.warn(TURNED, TURNED_TEXT, hint)
     settings.tool_offset(control, block, SAME.get(code, code))
     if control.tools.vector[Z] != before and "Z" not in block.values and not z_is_named_first(control):
         control.warn(LENGTH_ALONE, ALONE, "state Z in the block, or check what the control does (parameter TOS)")
@@ -101,12 +103,6 @@ def z_is_named_first(control: MacroControl) -> bool:
         if words & MOVING or not CALLS.isdisjoint(shape.m_codes):
             return False
     return False
-
-
-def note_turned(control: MacroControl) -> None:
-    """What X Y Z count from if rotary axes stand turned where G43.4 is switched on depends on the control."""
-    if not control.tcp and any(abs(control.position[i]) > NOTHING for i in control.turning):
-        control.warn(TURNED, TURNED_TEXT, "switch G43.4 on with the rotary axes at zero, or check the parameters")
 
 
 def take_number(control: MacroControl, block: Block) -> None:

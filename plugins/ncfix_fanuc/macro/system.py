@@ -36,11 +36,6 @@ HARMLESS = (range(1000, 2000), range(3000, 3030), range(12001, 14000))
 SYSTEM_CODES = {1: 54, 2: 55, 3: 56, 4: 57, 5: 58, 6: 59, 0: 54.1}
 
 
-def getters(control: MacroControl) -> dict[int, Getter]:
-    """Variables that the control computes when they are read."""
-    return positions(control) | modes(control) | offsets(control)
-
-
 def positions(control: MacroControl) -> dict[int, Getter]:
     """End of the block before (5001), machine position (5021), present position (5041), by axis of the machine."""
     found: dict[int, Getter] = {}

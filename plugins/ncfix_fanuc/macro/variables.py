@@ -211,13 +211,9 @@ class MacroVariables(NumberedParameters):
         store = self.store_of(index)
         if index in self.live:
             return self.from_control(index)
-        if index not in store and self.is_left_over(index):
+        if index not in store and (is_common(index) or (self.inherits and len(self.scopes) == 1)):
             return self.unset(index)
         return store.get(index, Unknown(f"#{index}") if is_system(index) else VACANT)
-
-    def is_left_over(self, index: int) -> bool:
-        """Whether a variable that the program has not set may have a value from another program."""
-        return is_common(index) or (self.inherits and len(self.scopes) == 1)
 
     def from_control(self, index: int) -> Value:
         """A value that the control computes; a position is not what it will be when the program is corrected."""

@@ -22,7 +22,7 @@ from ncfix.text.dialect import Dialect
 from ncfix.text.grammar import UnspacedBlock, parse
 from ncfix.text.numbers import POINT, SIGN, table
 from ncfix.text.reach import UNREAD
-from ncfix.text.shapes import ODD, Scan, block_of, in_slices, scan_beside, scan_compiled, split_blocks
+from ncfix.text.shapes import ODD, Scan, block_of, blocks_at, in_slices, scan_beside, scan_compiled, split_blocks
 from ncfix.text.spelling import value_of
 from ncfix.text.tree import (
     END,
@@ -103,7 +103,14 @@ def scan_plain(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
     comments = np.array([match.span() for match in COMMENT.finditer(source)], dtype=np.int64).reshape(-1, 2)
     comments = comments[inside(blocks, comments[:, 0])]
-    found = scan_beside(text, blocks, comments, comments, fixed=FIXED, apart=of_several_lines(text, blocks))
+    found = scan_beside(
+        text,
+        blocks,
+        comments,
+        comments,
+        fixed=FIXED,
+        apart=blocks_at(blocks, np.flatnonzero(text == COMMAS[ord("\n")])),
+    )
     return found.setting_apart(misnumbered(text, blocks, found))
 
 
@@ -122,13 +129,6 @@ def misnumbered(text: NDArray[np.uint8], blocks: NDArray[np.int64], found: Scan)
 def inside(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which places stand inside a block."""
     return places < blocks[block_of(blocks, places), 1]
-
-
-def of_several_lines(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list[int]:
-    """The blocks with a line end in them."""
-    places = np.flatnonzero(text == COMMAS[ord("\n")])
-    owner = block_of(blocks, places)
-    return list(map(int, owner[places < blocks[owner, 1]]))
 
 
 BEFORE_NUMBERS = b" \t\x0b\x0c\xa0/"

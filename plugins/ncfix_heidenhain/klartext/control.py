@@ -10,7 +10,7 @@ from ncfix.control import control as base
 from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, X, Y, Z, mask_of
 from ncfix.control.frames import shifted
 from ncfix.control.moves import AT_START, Motion, MotionEnd, MotionKind, Pass, Passing, UnknownAxes, first_reason
-from ncfix.control.setup import WORK_OFFSET, Run, Setup, Tool
+from ncfix.control.setup import WORK_OFFSET, Run, Tool
 from ncfix.control.tcp import TURNED, switch
 from ncfix.text.dialect import Dialect
 from ncfix.values import frozen, mutable
@@ -116,7 +116,11 @@ class KlartextControl(base.ProgramControl):
         self.turn = 0.0
         self.doubtful = ""
         self.functions: frozenset[str] = frozenset()
-        self.scope = FormulaScope(parameters=QParameters(dict(q_parameters(run.setup))))
+        self.scope = FormulaScope(
+            parameters=QParameters(
+                {name.upper(): value for name, value in run.setup.variables.items() if name[:1] in "Qq"}
+            )
+        )
         self.path = PathFunctionState()
         self.cycle = CycleInForce()
         self.m128 = run.setup.tcp
@@ -248,8 +252,3 @@ class KlartextControl(base.ProgramControl):
         unknown |= {INDEX[letter]: lost for letter in letters if INDEX[letter] in self.machine}
         super().make(Motion(MotionKind.RAPID, 0, MotionEnd(self.position[:], unknown), 0, passing=passing))
         self.path.tangent = None
-
-
-def q_parameters(setup: Setup) -> dict[str, float]:
-    """The Q parameters that the setup gives."""
-    return {name.upper(): value for name, value in setup.variables.items() if name[:1] in "Qq"}

@@ -126,16 +126,13 @@ class _Chain:
         if element.opens:
             self.home = self.at
         if element.closes:
-            element = self._closing(element)
+            if self.home is None or element.x is not None or element.y is not None:
+                raise NoSolutionError
+            element = replace(element, x=self.home.real, y=self.home.imag)
         if element.arc:
             self._arc(element)
         else:
             self._line(element, following)
-
-    def _closing(self, element: Element) -> Element:
-        if self.home is None or element.x is not None or element.y is not None:
-            raise NoSolutionError
-        return replace(element, x=self.home.real, y=self.home.imag)
 
     # -- lines --------------------------------------------------------------------------------------------------------
 
@@ -147,7 +144,7 @@ class _Chain:
         if end is None and direction is not None:
             end = self._along(element, direction)
         elif end is None and element == Element(arc=False, tangential=False) and target is not None:
-            end = self._towards(target)
+            end = target.touched(touching(target.centre - self.at, target.sense * target.radius))
         if end is None or abs(end - self.at) < self.near:
             raise NoSolutionError
         if element.length is not None:
@@ -178,11 +175,6 @@ class _Chain:
             if value is not None and abs(part) > math.sin(math.radians(1)) and (value - begin) / part > 0:
                 return self.at + (value - begin) / part * direction
         return None
-
-    def _towards(self, target: DirectedCircle) -> complex:
-        """Where a line from here touches a circle that is gone round next."""
-        direction = touching(target.centre - self.at, target.sense * target.radius)
-        return target.touched(direction)
 
     def _leave(self, circle: DirectedCircle, element: Element, target: DirectedCircle | None) -> complex | None:
         """End an arc where a line leaves it: of a known direction, to a known end, or to the next circle.

@@ -225,7 +225,9 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         elif name.startswith("plane "):
             transformations.plane(control, name.removeprefix("plane "), words, plan.flags)
         elif name.startswith("trans datum"):
-            self.shift_datum(name, words)
+            if name.endswith("reset"):
+                transformations.reset_datum(self.control)
+            transformations.shift(self.control, words, "")
         else:
             return self.motion(plan, words, flow)
         return False
@@ -283,12 +285,6 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         items = program.items_of(block)
         return " ".join(program.slice(block, item.span) for item in items if isinstance(item, Opaque))
 
-    def shift_datum(self, name: str, words: MotionWords) -> None:
-        """TRANS DATUM."""
-        if name.endswith("reset"):
-            transformations.reset_datum(self.control)
-        transformations.shift(self.control, words, "")
-
     # -- motions ------------------------------------------------------------------------------------------------------
 
     def motion(self, plan: KlartextPlan, words: MotionWords, flow: KlartextFlow) -> bool:
@@ -301,7 +297,8 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         step = Step(plan.name, MotionWords(values, words.unknown & values.keys()), plan.flags, codes)
         self.note_foreign(plan, step)
         before_motion(control, step)
-        control.path.ahead = self.corner_ahead(flow)
+        following = flow.unit.next_plan(flow.block)
+        control.path.ahead = following is not None and following.name in CORNERS
         control.path.doubtful = 127 in codes and control.shortest
         self.move(plan, step)
         for code, own in plan.codes:
@@ -331,11 +328,6 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
                 modal.feed_mode = mode
         if "fauto" in plan.flags:
             modal.feed = self.control.auto_feed
-
-    def corner_ahead(self, flow: KlartextFlow) -> bool:
-        """Whether the next block makes a corner of the end of this one."""
-        following = flow.unit.next_plan(flow.block)
-        return following is not None and following.name in CORNERS
 
     def move(self, plan: KlartextPlan, step: Step) -> None:
         """What moves in a block, if anything does."""

@@ -132,7 +132,9 @@ def before_motion(control: KlartextControl, step: Step) -> None:
     if 142 in step.codes and not is_untransformed(control):
         control.suspend("M142", DELETED)
     if 94 in step.codes:
-        reduce_turns(control, step.flags)
+        for index in control.turning:
+            if f"axis {LETTERS[index].lower()}" in step.flags or not step.flags & NAMED_AXES:
+                control.position[index] %= TURN
     if 138 in step.codes:
         choose_axes(control, step.flags)
     if 140 in step.codes and control.path_word(step.words.values):
@@ -159,14 +161,6 @@ def choose_axes(control: KlartextControl, flags: frozenset[str]) -> None:
     turning = {f"axis {LETTERS[index].lower()}" for index in control.turning}
     if flags & NAMED_AXES not in (set(), turning):
         control.suspend("M138", CHOSEN)
-
-
-def reduce_turns(control: KlartextControl, flags: frozenset[str]) -> None:
-    """M94: rotary axes, those that are named if any is, are said by an angle below a turn from here on."""
-    named = flags & NAMED_AXES
-    for index in control.turning:
-        if not named or f"axis {LETTERS[index].lower()}" in named:
-            control.position[index] %= TURN
 
 
 def tip_control(control: KlartextControl, *, on: bool) -> None:
@@ -360,11 +354,6 @@ def not_followed(control: KlartextControl, flow: KlartextFlow, match: re.Match[s
     control.refuse_rest(f"{name} may change coordinates in a way that is not followed")
 
 
-def free_contour(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
-    """FL, FLT, FC, FCT."""
-    follow_free(control, flow.unit, flow.block - 1)
-
-
 # -- what is measured and read ----------------------------------------------------------------------------------------
 
 
@@ -401,11 +390,6 @@ def holes(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) ->
     control.cycle.places = pattern_of(match[0], control.scope.parameters)
 
 
-def change_coordinates(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
-    """TRANS."""
-    trans(control, match[0])
-
-
 def is_untransformed(control: KlartextControl) -> bool:
     """Whether neither a transformation nor a tilted plane is in force."""
     return is_plain(control) and not (control.plane_tilted or any(control.frames.programmable.shift))
@@ -436,15 +420,15 @@ def tcpm(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> 
 Do = Callable[[KlartextControl, KlartextFlow, re.Match[str]], None]
 
 FORMS: tuple[tuple[str, Do], ...] = (
-    (r"CALL\s+PGM\s*(?P<name>.*)", call_program),
+    (r"CALL\s+PGM\s*(?P<name>.*)", lambda control, flow, match: flow.call_program(match["name"].strip())),
     (r"SEL\s+PGM\s*(?P<name>.*)", select_program),
     (r"CALL\s+SELECTED\b", call_selected),
     (r"FN\s*14\s*:\s*ERROR\s*=?\s*(?P<number>\w*)", error),
-    (r"F(LT|L|CT|C)\b", free_contour),
+    (r"F(LT|L|CT|C)\b", lambda control, flow, _: follow_free(control, flow.unit, flow.block - 1)),
     (r"TCH\s*PROBE\s*(?P<number>\d+).*", probe),
     (r"FN\s*(18|2[0348])\b.*", read_values),
     (r"(PATTERN\s+DEF|SEL\s+PATTERN).*", holes),
-    (r"TRANS\b.*", change_coordinates),
+    (r"TRANS\b.*", lambda control, _, match: trans(control, match[0])),
     (r"PRESET\s+SELECT\s+#\s*(?P<row>\d+)(?P<rest>.*)", select_preset),
     (r"FUNCTION\s+(?P<reset>RESET\s+)?TCPM\b(?P<rest>.*)", tcpm),
     # FUNCTION statements that leave coordinates as they are; others (turning, parallel axes, corrections, another

@@ -91,7 +91,8 @@ def destination(control: KlartextControl, words: MotionWords) -> MotionEnd:
 def programmed_position(control: KlartextControl, words: MotionWords) -> FramePosition:
     """The position to which the words of axes lead."""
     if words.incremental:
-        use_start_of(control, words)
+        counted = [INDEX[address[1:]] for address in words.values if address[0] == "I" and address[1:] in INDEX]
+        control.use_start_positions(list(control.machine) if control.is_rotated else counted)
     where = here(control)
     for address, value in words.values.items():
         letter = address.removeprefix("I")
@@ -106,7 +107,8 @@ def programmed_position(control: KlartextControl, words: MotionWords) -> FramePo
         where.inner[index] += control.scale[index] * value
         if address in words.unknown:
             where.unknown[index] = RUNTIME
-    by_spatial_angles(control, words, where)
+    if control.path.spatial and {"A", "B", "C"} & {address.removeprefix("I") for address in words.values}:
+        where.unknown |= dict.fromkeys(control.turning, SPATIAL)
     return where
 
 
@@ -125,20 +127,6 @@ def derived(control: KlartextControl, words: MotionWords, axes: int) -> str:
         own |= mask_of(control.turning)
     index = next((i for i in control.machine if (axes & ~own & control.places.unplaced) >> i & 1), None)
     return "" if index is None else UNPLACED.format(LETTERS[index])
-
-
-def by_spatial_angles(control: KlartextControl, words: MotionWords, where: FramePosition) -> None:
-    """A B C as spatial angles (FUNCTION TCPM AXIS SPAT): where the rotary axes go the control works out."""
-    if control.path.spatial and {"A", "B", "C"} & {address.removeprefix("I") for address in words.values}:
-        where.unknown |= dict.fromkeys(control.turning, SPATIAL)
-
-
-def use_start_of(control: KlartextControl, words: MotionWords) -> None:
-    """Increments count from where axes stand: start positions that matter are asked for."""
-    wanted = [INDEX[address[1:]] for address in words.values if address[0] == "I" and address[1:] in INDEX]
-    if control.is_rotated:
-        wanted = list(control.machine)
-    control.use_start_positions(wanted)
 
 
 def command_of(control: KlartextControl, where: FramePosition, axes: int) -> MotionEnd:

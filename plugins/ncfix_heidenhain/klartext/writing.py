@@ -314,14 +314,10 @@ class KlartextWriter(BlockWriter):
         if self.layout.polar:
             self._motion_code()
         if called and self.added:
-            self._positioned()
+            words = [text.strip() for text in self.added]  # CYCL CALL acts where the block before led to
+            self._function(" ".join(["L", *words, self.layout.closing or "FMAX", "M99"]))
+            self.added.clear()
         self.out.ends.append(position)
-
-    def _positioned(self) -> None:
-        """CYCL CALL executes the cycle where the block before led to, M99 at the end of a block of its own."""
-        words = [text.strip() for text in self.added]
-        self._function(" ".join(["L", *words, self.layout.closing or "FMAX", "M99"]))
-        self.added.clear()
 
     def _bottom(self, across: int) -> float:
         """Where the hole ends, as it is written."""

@@ -295,8 +295,10 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
                 unknown.append(code)
                 continue
             enter(g, rules.g_groups[code], word, code, rules)
-        else:
-            enter_m(m, word, code, rules)
+        elif code in rules.m_groups:
+            enter(m, rules.m_groups[code], word, code, rules)
+        elif rules.strict:  # elsewhere one that is not known changes no coordinates
+            raise Fault(UNKNOWN_M, f"M{code / 10:g} is not a code of LinuxCNC", span=word.span)
     if rules.strict and sum(word.address == "M" for word, _ in pairs) > MAX_M_CODES:
         raise Fault(CONFLICT, f"more than {MAX_M_CODES} M codes in a block", span=pairs[-1][0].span)
     if not rules.strict and g.get(groups.SYSTEM) == FIRST_SYSTEM and "P" in letters:
@@ -351,15 +353,6 @@ def enter(codes: dict[str, int], group: str, word: Word, code: int, rules: Rules
         first, second = (f"{word.address}{number / 10:g}" for number in (codes[group], code))
         raise Fault(CONFLICT, f"{first} and {second} exclude one another (both set the {group})", span=word.span)
     codes[group] = code
-
-
-def enter_m(codes: dict[str, int], word: Word, code: int, rules: Rules) -> None:
-    """Note an M code; one that is not known changes no coordinates, but LinuxCNC refuses it."""
-    group = rules.m_groups.get(code)
-    if group is not None:
-        enter(codes, group, word, code, rules)
-    elif rules.strict:
-        raise Fault(UNKNOWN_M, f"M{code / 10:g} is not a code of LinuxCNC", span=word.span)
 
 
 def lane_of(plan: RS274Plan) -> Lane | None:

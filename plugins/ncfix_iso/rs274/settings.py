@@ -215,7 +215,8 @@ def offset_of(control: RS274Control, block: Block, code: int) -> tuple[Vector, i
         return *offset_by_words(control, block, added=code == 432), False
     tool, number = zeros(), numbered_tool(control, block)
     tool[Z] = length_of(control, number) * (-1.0 if code == 440 else 1.0)
-    return tool, number, number > 0 and is_lacking(control, number)
+    said = number in control.tools.lengths or control.knowledge.known_tool_length(number) is not None
+    return tool, number, number > 0 and not said
 
 
 def offset_by_words(control: RS274Control, block: Block, *, added: bool) -> tuple[Vector, int]:
@@ -243,11 +244,6 @@ def numbered_tool(control: RS274Control, block: Block) -> int:
     if control.tools.unsure:
         control.refuse_rest(TOOL_AT_RUN_TIME)
     return control.tools.spindle
-
-
-def is_lacking(control: RS274Control, number: int) -> bool:
-    """Whether nobody has said how long a tool is."""
-    return number not in control.tools.lengths and control.knowledge.known_tool_length(number) is None
 
 
 def length_of(control: RS274Control, number: int) -> float:

@@ -154,13 +154,8 @@ def key_of(text: str) -> Key:
     """The variable that a setup names."""
     name, bracket, rest = "".join(text.split()).lower().partition("[")
     if bracket:
-        return name, tuple(float(part) for part in rest.rstrip("]").split(",") if is_number(part))
+        return name, tuple(float(part) for part in rest.rstrip("]").split(",") if part.lstrip("-").isdigit())
     return ("r", (float(name[1:]),)) if name[:1] == "r" and name[1:].isdigit() else name
-
-
-def is_number(text: str) -> bool:
-    """Whether a text is a whole number."""
-    return text.lstrip("-").isdigit()
 
 
 Key = str | tuple[str, tuple[float, ...]]

@@ -69,7 +69,7 @@ class SinumerikFlattener(Flattener):
 
     def opaque(self, item: Opaque) -> Change | None:
         """Heads of subprograms fall away."""
-        leads = item.kind in ("program head", "external") and not (self.main and is_head(self.turn))
+        leads = item.kind in ("program head", "external") and (not self.main or self.turn.plan.steps)
         return self.dropped(item) if leads else None
 
     def word(self, word: Word) -> Change | None:
@@ -186,11 +186,6 @@ def indices(target: NumberedParameter | NamedParameter | FunctionCall) -> tuple[
 def is_index(value: Expression | None) -> bool:
     """Whether an index is written as it is: a number, or a name, as that of an axis."""
     return value is not None and (is_plain(value) or isinstance(value, NamedParameter))
-
-
-def is_head(turn: Turn) -> bool:
-    """Whether the block is the first line of a program of an archive, and no PROC."""
-    return not turn.plan.steps
 
 
 def assigned(value: float | str) -> str:

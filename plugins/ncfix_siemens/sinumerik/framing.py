@@ -57,19 +57,14 @@ def programmable(control: Sinumerik, name: str, words: BlockWordValues) -> None:
     modes = control.modes
     before = control.frames.programmable if name != kind else WORLD
     if name == kind:
-        over_fine(control, name, words)
+        if modes.fine and axis_values(words):  # whether what G59 has set goes with the one before is told in two ways
+            control.suspend("frame", FINE_STAYS.format(name.upper()))
+        modes.added, modes.fine = ZEROS, False
     elif name == "atrans":
         plain = modes.added is not None and before.rotation == WORLD.rotation and before.scale == 1.0
         modes.added = Affine(modes.added or ZEROS).then(frame).shift if plain else None
     control.frames = replace(control.frames, programmable=before.then(frame))
     control.refresh()
-
-
-def over_fine(control: Sinumerik, name: str, words: BlockWordValues) -> None:
-    """A frame is programmed anew; whether what G59 has set goes with the one before is told in two ways."""
-    if control.modes.fine and axis_values(words):
-        control.suspend("frame", FINE_STAYS.format(name.upper()))
-    control.modes.added, control.modes.fine = ZEROS, False
 
 
 def translation(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:

@@ -186,7 +186,10 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
 
     def moves(self) -> Moves:
         """The motions of the program, when it has been followed."""
-        return all_or_none(demoted(self.control.moves(), self.again, self.why), self.main.program)
+        moves = self.control.moves()
+        for first, stop in self.again:  # these may be executed again from another state
+            moves = moves.refused((first <= moves.block) & (moves.block < stop), self.why)
+        return all_or_none(moves, self.main.program)
 
     def run_lane(self, unit: SinumerikUnit, block: int, plan: SinumerikPlan) -> int:
         """See `Interpreter`; blocks that point the tool go in a lane of their own."""
@@ -458,13 +461,6 @@ def targets(unit: SinumerikUnit, step: Branching, block: int) -> list[int]:
     if "goto" not in step.keyword and step.keyword not in ("repeat", "repeatb"):
         return []
     return unit.labelled(step.label) or ([unit.begin] if "goto" in step.keyword else [])
-
-
-def demoted(moves: Moves, again: Iterable[tuple[int, int]], why: str) -> Moves:
-    """The motions with those of blocks refused that may be executed again from another state."""
-    for first, stop in again:
-        moves = moves.refused((first <= moves.block) & (moves.block < stop), why)
-    return moves
 
 
 LOUD_M = frozenset({20, 60, 170, 300})

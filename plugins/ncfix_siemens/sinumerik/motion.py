@@ -108,7 +108,8 @@ def by_itself(control: Sinumerik, words: BlockWordValues, special: frozenset[str
     elif "meas" in special:
         measure(control, words)
     elif "soft" in special:
-        soft_approach(control, words)
+        refused(control, words, control.modal.motion, "a soft approach or retraction (G147, G148, ...)")
+        control.lose(GEOMETRY, AFTER_APPROACH)
     else:
         as_coded(control, words, control.modal.motion)
 
@@ -180,12 +181,6 @@ def measure(control: Sinumerik, words: BlockWordValues) -> None:
     lost = end.lost | control.along_frame(gone)
     ends = MotionEnd(end.target, end.unknown | gone, lost)
     control.go(MotionKind.FEED, words, ends, control.modal.motion, passing=MEASURING)
-
-
-def soft_approach(control: Sinumerik, words: BlockWordValues) -> None:
-    """G147, G148 and their like: the control adds motions of its own."""
-    refused(control, words, control.modal.motion, "a soft approach or retraction (G147, G148, ...)")
-    control.lose(GEOMETRY, AFTER_APPROACH)
 
 
 def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:

@@ -30,7 +30,7 @@ import numpy as np
 from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z, mask_of, product
 from ncfix.control.expressions import Fault, number
 from ncfix.control.frames import WORLD, Affine, projected, shifted, turned
-from ncfix.control.lanes.block_rows import BlockRows, IntArray, stage_of
+from ncfix.control.lanes.block_rows import BlockRows, stage_of
 from ncfix.control.lanes.lane import SHORTEST, before_placing, is_open, take
 from ncfix.control.moves import FeedMode, MotionEnd, MotionKind, Pass, Passing
 from ncfix.control.pointing import Pointing, Triple, Ways, dot, nearest
@@ -122,13 +122,20 @@ def by_direction(control: Sinumerik, words: BlockWordValues) -> str:
         return BY_CURVE.format(control.modes.orientation.upper())
     if control.posture.pointing is None:
         return NO_KINEMATICS
-    wanted = by_angles(control, words) if any(address in words.values for address in ANGLES) else by_vector(words)
+    if any(address in words.values for address in ANGLES):
+        wanted = by_angles(control, words)
+    else:
+        a, b, c = (words.get(address) for address in VECTOR)
+        wanted = a, b, c
     if wanted is None:
         return WHICH_ANGLES
     control.use_all_start_positions()
     if control.unknown.keys() & {*control.turning}:
         return FROM_UNKNOWN.format(LETTERS[control.machine[control.posture.pointing.columns[0]]])
-    found = control.postures(direction_of(control, wanted))
+    size = math.hypot(*wanted)
+    if size < NO_LENGTH:
+        raise Fault(BAD_VECTOR, "the direction of the tool (A3 B3 C3) has no length")
+    found = control.postures([dot(row, wanted) / size for row in control.rotation])
     if found is None or not found.ways:
         raise Fault(BAD_VECTOR, "the rotary axes cannot point the tool in this direction")
     if found.leaves_pole:
@@ -142,12 +149,6 @@ def by_direction(control: Sinumerik, words: BlockWordValues) -> str:
     even = control.modes.orientation == BY_AXES or control.modal.motion == 0
     words.whole |= not even and found.strays
     return ""
-
-
-def by_vector(words: BlockWordValues) -> Triple:
-    """A3 B3 C3."""
-    a, b, c = (words.get(address) for address in VECTOR)
-    return a, b, c
 
 
 def by_angles(control: Sinumerik, words: BlockWordValues) -> Triple | None:
@@ -168,14 +169,6 @@ TURNS = {
     "orirpy2": (("X", "A2"), ("Y", "B2"), ("Z", "C2")),
 }
 """About which axis, as the turns before have left it, and by which word."""
-
-
-def direction_of(control: Sinumerik, vector: Triple) -> list[float]:
-    """A vector of the program as a unit vector in the workpiece."""
-    size = math.hypot(*vector)
-    if size < NO_LENGTH:
-        raise Fault(BAD_VECTOR, "the direction of the tool (A3 B3 C3) has no length")
-    return [dot(row, vector) / size for row in control.rotation]
 
 
 # -- many at once ------------------------------------------------------------------------------------------------------
@@ -224,7 +217,7 @@ def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Seque
     )
     here, path = (control.position[first], control.position[second]), stage.path
     found: list[tuple[float, float]] = []
-    even = even_motions(control, stage.motion.astype(np.int64))
+    even = ((stage.motion == 0) | (control.modes.orientation == BY_AXES)).tolist()
     at_will = True
     for both, is_even in zip(ways, even, strict=True):
         nearer = nearest(both, here)
@@ -239,11 +232,6 @@ def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Seque
         at_will = math.isnan(both[0][0])
     path[1 : len(found) + 1, letters] = found or np.empty((0, 2))
     return len(found)
-
-
-def even_motions(control: Sinumerik, motion: IntArray) -> list[bool]:
-    """(n,) motions in which the rotary axes turn evenly, whatever the tool does meanwhile."""
-    return ((motion == 0) | (control.modes.orientation == BY_AXES)).tolist()
 
 
 # -- CYCLE800 ----------------------------------------------------------------------------------------------------------

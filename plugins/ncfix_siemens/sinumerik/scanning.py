@@ -136,7 +136,8 @@ def numbered(lines: list[str]) -> list[str]:
     blank = next(block["blank"] for block in blocks if block is not None and block["number"])
     result, new, count = [], {}, 0
     for line, block in zip(lines, blocks, strict=True):
-        if block is None or not (block["number"] or is_words(block["rest"])):
+        bare = block is not None and WORDS.match(block["rest"]) and not LABEL.match(block["rest"])
+        if block is None or not (block["number"] or bare):
             result.append(line)
             continue
         count += STEP
@@ -145,11 +146,6 @@ def numbered(lines: list[str]) -> list[str]:
         gap = block["blank"] if block["number"] else blank
         result.append(f"{block['before']}N{count}{gap}{block['rest']}")
     return [redirected(line, new, old) for line in result]
-
-
-def is_words(text: str) -> bool:
-    """Whether a block without a number is nothing but words."""
-    return bool(WORDS.match(text)) and not LABEL.match(text)
 
 
 def redirected(line: str, new: dict[int, int], old: list[int]) -> str:

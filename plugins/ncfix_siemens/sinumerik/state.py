@@ -287,7 +287,8 @@ class Sinumerik(ProgramControl):
         placed      as there; None: the axes of its words, but for increments, and none where the motion is passed
         by_machine  the words are machine coordinates
         """
-        axes = self._axes_of(words)
+        polar = self.modal.plane.axes if words.values.keys() & {"AP", "RP"} else 0  # these name both axes of the plane
+        axes = words.axes | polar
         if placed is None:
             placed = 0 if passing else axes & ~mask_of(self.counted_words(words))
         self.fresh_tool = False
@@ -342,11 +343,6 @@ class Sinumerik(ProgramControl):
             self.heading = departing(arc, stretch.end[last].tolist(), steps[last].tolist())[:3]
         elif last >= 0:
             self.heading = steps[last, :3].tolist() if steps[last, :3].any() else None
-
-    def _axes_of(self, words: BlockWordValues) -> int:
-        """The axes that a block names, as bits: polar coordinates name both axes of the plane."""
-        plane = self.modal.plane
-        return words.axes | (plane.axes if words.values.keys() & {"AP", "RP"} else 0)
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
         """As for all controls; whether it is a rapid, the program has to have said."""

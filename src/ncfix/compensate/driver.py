@@ -185,8 +185,12 @@ class Corrector:
             own[:1] = False
         tally.add(part.program, joint, own, self.machine)
         if task.options.verify:
-            errors = [(each.moves, self._tip_errors(each, own)) for each in joint.plans]
-            self.note(tally, part.program, *errors)
+            found = list[tuple[Moves, PathError]]()
+            for each in joint.plans:
+                shown = each.shown(task.options.split_rapids)
+                errors = path_error(each.written, shown if own is None else own & shown, each.plan.known)
+                found.append((each.moves, errors))
+            self.note(tally, part.program, *found)
         if self.watch is not None:
             self.watch(part.program, solution, own)
         return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
@@ -203,11 +207,6 @@ class Corrector:
             return program.source
         self.stamped = edit.text
         return spliced(program.source, Splices.joined([splices, Splices.of([edit])]))
-
-    def _tip_errors(self, solution: WrittenPlan, own: Mask | None) -> PathError:
-        """Tip errors before and after, with the numbers as the control will understand them; of motions `own` (n,)."""
-        shown = solution.shown(self.task.options.split_rapids)
-        return path_error(solution.written, shown if own is None else own & shown, solution.plan.known)
 
     def note(self, tally: Tally, program: Program, *errors: tuple[Moves, PathError]) -> None:
         """Take in the tip errors of a part, in each position of block delete."""

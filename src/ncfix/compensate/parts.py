@@ -106,7 +106,10 @@ class Parts:
             moves = joined_moves([each for _, each in pending], [len(each) for each in programs])
             self._tell(None if last or len(pending) > 1 else self._checkpoint(*pending[0]))
             if last:
-                self._check_rest()
+                while self.follower.to_the_last and not self.rest.strip() and (more := self.read(self.size)):
+                    self.rest += more
+                if self.follower.to_the_last and self.rest.strip():
+                    raise NotInPartsError("text that may belong to the program comes after its end")
             self.found += 1
             yield Part(joined(programs), moves, last)
             pending = []
@@ -150,13 +153,6 @@ class Parts:
         self.blocks += checkpoint.blocks
         self.follower.resume(checkpoint.control)
         return self.reader.read(text[checkpoint.begin : checkpoint.size])
-
-    def _check_rest(self) -> None:
-        """Raise `NotInPartsError` if text comes after the end of the program that might belong to it."""
-        while self.follower.to_the_last and not self.rest.strip() and (more := self.read(self.size)):
-            self.rest += more
-        if self.follower.to_the_last and self.rest.strip():
-            raise NotInPartsError("text that may belong to the program comes after its end")
 
     @property
     def _wanted(self) -> int:
@@ -303,7 +299,10 @@ class MachineParts(Parts):
             if self.look is not None:
                 self.look(part)
             continued = ContinuedPart(part, head, direction, self.placed)
-            self._check_units(part.moves, head is None)
+            units = {frame.unit for frame in part.moves.frames}
+            if head is not None and not units <= self.units:
+                raise NotInPartsError("the program changes between inch and mm")
+            self.units |= units
             if not part.last:
                 head, direction = self._head(continued)
             self.count += 1
@@ -322,12 +321,6 @@ class MachineParts(Parts):
             self.tools.setdefault(name, name)
             self.notes.setdefault((message.code, message.text), message)
         return found.moves
-
-    def _check_units(self, moves: Moves, first: bool) -> None:
-        units = {frame.unit for frame in moves.frames}
-        if not units <= self.units and not first:
-            raise NotInPartsError("the program changes between inch and mm")
-        self.units |= units
 
     def _head(self, continued: ContinuedPart) -> tuple[Part, Signs]:
         """The last motion with its block, and the way in which the axes came there."""

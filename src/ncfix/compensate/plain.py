@@ -408,17 +408,15 @@ class Planner:
             start[at_start] = real.start[own[at_start]]
             along, begin = replace(real.rows(own), start=start, end=ends), poses.joints(start)
             within = not poses.leave_travel(along, begin, positions, poses.accelerations(along, begin, positions))
-        return within and self._small(change) and self._steady(change - before)
+        if not within or not self._small(change):
+            return False
+        return bool(lengths((change - before)[:, ~self.machine.rotary]).max(initial=0.0) <= NEARLY * JUMP)
 
     def _small(self, shift: Array) -> bool:
         """Whether corrections (k, n_axes) are smaller than the machine allows."""
         linear, rotary = self.machine.max_correction
         turns = np.abs(shift[:, self.machine.rotary]).max(initial=0.0) <= NEARLY * rotary
         return bool(turns and lengths(shift[:, ~self.machine.rotary]).max(initial=0.0) <= NEARLY * linear)
-
-    def _steady(self, change: Array) -> bool:
-        """Whether corrections change by no more than they may at one place."""
-        return bool(lengths(change[:, ~self.machine.rotary]).max(initial=0.0) <= NEARLY * JUMP)
 
 
 def plain_ones(head: Moves, moves: Moves) -> Mask | None:

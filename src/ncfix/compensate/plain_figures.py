@@ -92,7 +92,9 @@ def _at_ends(plan: PlainPlan, text: Emission, written: Segments, masks: tuple[Ma
     places = np.array([0, -1, -1], dtype=np.int64)
     counts, (shown, apart), bending = np.zeros(len(moves), dtype=np.intp), masks, features(machine)
     if moves.tcp[0]:
-        counts = _looks(plan, shown, bends_closely(plan.intent, np.arange(len(moves))))
+        bends = bends_closely(plan.intent, np.arange(len(moves)))
+        bent = shown & (moves.kind == MotionKind.FEED) & (bends >= STRAIGHT)
+        counts = np.where(bent, np.minimum(np.ceil(DENSITY * bends), MOST_SHOWN), 0).astype(np.intp)
         bending = np.full_like(bending, np.inf)
     linear, followed = ~machine.rotary, moves.kind == MotionKind.FEED
     motions.at_ends(
@@ -123,12 +125,6 @@ def _at_ends(plan: PlainPlan, text: Emission, written: Segments, masks: tuple[Ma
     counts[apart] = 0
     tally.take(way, count, squares, [(most, row, 1.0) for most, row in zip(sums[3:].tolist(), rows, strict=True)])
     return counts
-
-
-def _looks(plan: PlainPlan, among: Mask, bends: Array) -> Index:
-    """At how many places inside of motions `among` (n,) to look, over which the error may bend so many times, (n,)."""
-    bent = among & (plan.part.moves.kind == MotionKind.FEED) & (bends >= STRAIGHT)
-    return np.where(bent, np.minimum(np.ceil(DENSITY * bends), MOST_SHOWN), 0).astype(np.intp)
 
 
 def _inside(plan: PlainPlan, written: Segments, rows: Index, counts: Index) -> PathSamples:

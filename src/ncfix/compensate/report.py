@@ -228,7 +228,9 @@ class Tally:
         for k, (solution, lack, found) in enumerate(zip(every, lacking, worst_findings(every), strict=True)):
             moves, plan, intent = solution.moves, solution.plan, solution.intent
             self.rounding = max(self.rounding, rounding_along(intent, plan.pieces, plan.corners, own))
-            self.largest = max(self.largest, largest_correction(moves, solution, own))
+            done = ~solution.unchanged if own is None else own & ~solution.unchanged
+            shift = lengths(solution.shift[:, ~moves.rotary])[done]
+            self.largest = float(np.nanmax(shift, initial=self.largest))
             unseen |= without_figure(moves, solution.unchanged, lack.axes if lack else None, own)
             for finding in (*found, *as_written(solution)):
                 self.found.add(finding, program, moves, own, k)
@@ -343,12 +345,6 @@ def refusals(program: Program, account: Account) -> list[Refusal]:
         Refusal(line, reason.code, reason.text if reason.cause < 0 else f"{reason.text} (line {cause})")
         for line, reason, cause in zip(lines, reasons, causes, strict=True)
     ]
-
-
-def largest_correction(moves: Moves, solution: WrittenPlan, own: Mask | None = None) -> float:
-    """The largest shift of a linear command, mm; of motions `own` (n,) if given."""
-    done = ~solution.unchanged if own is None else own & ~solution.unchanged
-    return float(np.nanmax(lengths(solution.shift[:, ~moves.rotary])[done], initial=0.0)) if done.any() else 0.0
 
 
 def in_lines(report: FixReport, flat: Flat, program: Program) -> FixReport:

@@ -140,7 +140,11 @@ def additive(
         nodes = np.round(region.fine(axis, count) / unit, 4) * unit
         half = region.half_reversal(axis) if both else np.zeros(FINE)
         tables.append(_axis_tables(region, axis, curve, outputs, nodes, half))
-    return tuple(_with_constant(each, machine, total) for each in tables)
+    for number, table in enumerate(tables):  # that of an axis over itself has the mean over all
+        constant, values = total[number], table.values.copy()
+        values[:, table.outputs.index(table.input)] += constant
+        tables[number] = replace(table, values=values, reverse=table.reverse + constant)
+    return tuple(tables)
 
 
 @frozen
@@ -205,14 +209,6 @@ def _axis_tables(
     return AxisTables(names[axis], nodes, tuple(names[j] for j in outputs), values, reverse)
 
 
-def _with_constant(table: AxisTables, machine: Machine, total: Array) -> AxisTables:
-    """The table of an axis over itself has the mean over all."""
-    constant = total[machine.axis_names.index(table.input)]
-    values = table.values.copy()
-    values[:, table.outputs.index(table.input)] += constant
-    return replace(table, values=values, reverse=table.reverse + constant)
-
-
 @frozen
 class Reversal:
     """What is added to an axis while it moves towards plus, and taken off it while it moves towards minus.
@@ -241,18 +237,13 @@ def reversals(machine: Machine, space: Array, tool_length: float, target: float,
     for axis in linear_axes(machine):
         low, high = space[axis].tolist()
         fine = np.linspace(low, high, FINE)
-        curve = _half_play(machine, space, tool_length, axis, fine)
+        q, way = poses_along(axis, fine, even_poses(space, PLAY_POSES)), np.eye(len(space))[axis]
+        ahead, back = (exact_correction(machine, q, State(tool_length, each))[:, axis] for each in (way, -way))
+        curve = (ahead - back).reshape(FINE, PLAY_POSES).mean(axis=1) / 2
         if np.abs(curve).max() > SLIGHT:
             nodes = np.linspace(low, high, nodes_needed(fine, curve, most, SHARE * target))
             found.append(Reversal(machine.axis_names[axis], nodes, np.interp(nodes, fine, curve)))
     return tuple(found)
-
-
-def _half_play(machine: Machine, space: Array, tool_length: float, axis: int, fine: Array) -> Array:
-    """Half of what the own correction of an axis changes by with its way, at positions of it, (n,) mm."""
-    q, ways = poses_along(axis, fine, even_poses(space, PLAY_POSES)), np.eye(len(space))[axis]
-    ahead, back = (exact_correction(machine, q, State(tool_length, way))[:, axis] for way in (ways, -ways))
-    return (ahead - back).reshape(len(fine), PLAY_POSES).mean(axis=1) / 2
 
 
 def reversal_note(machine: Machine, space: Array, tool_length: float, done: Compensation = NOTHING) -> Iterator[str]:

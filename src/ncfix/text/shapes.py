@@ -274,8 +274,13 @@ def odd_blocks(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list[int]:
     """The blocks that hold an `ODD` byte."""
     suspicious = np.flatnonzero((text <= ord("\r")) & (text != ord("\n")))
     places = suspicious[ODD[text[suspicious]]]
+    return blocks_at(blocks, places)
+
+
+def blocks_at(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> list[int]:
+    """The blocks in which places (k,) lie; those behind a block, at its line end, do not count."""
     owner = block_of(blocks, places)
-    return list(map(int, owner[places < blocks[owner, 1]]))
+    return owner[places < blocks[owner, 1]].tolist()
 
 
 def first_numbers(blocks: NDArray[np.int64], numbers: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -25,7 +25,7 @@ from ncfix.text.writer import Splices
 from ncfix.values import mutable
 from ncfix.writer.bulk_arcs import CentreWords, OutputSteps, whole_arcs
 from ncfix.writer.bulk_fit import qualified, sound, with_dwells
-from ncfix.writer.bulk_layouts import CLOSING, OPENING, Layouts
+from ncfix.writer.bulk_layouts import CLOSING, OPENING, Layouts, places_of
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
 from ncfix.writer.target import FrameMap
@@ -77,7 +77,9 @@ class Bulk:
             fit &= ~moves.spelled.any(axis=1)
         fit = with_dwells(fit, program, moves, pieces, first_piece, layouts)
         stop = _stops(fit & ~jumps.any(axis=1) if jumps.any() else fit)
-        changes = np.append(np.flatnonzero((np.diff(frame) != 0) | _silenced(moves)) + 1, len(moves))
+        wordless = moves.wordless
+        silenced = (wordless[1:] & ~wordless[:-1]).any(axis=1)  # an axis gets no word behind a motion that may give one
+        changes = np.append(np.flatnonzero((np.diff(frame) != 0) | silenced) + 1, len(moves))
         stop[:-1] = np.minimum(stop[:-1], changes[np.searchsorted(changes, np.arange(len(moves)), side="right")])
         return cls(program, moves, pieces, first_piece, layouts, stop)
 
@@ -177,9 +179,8 @@ class Bulk:
 
     def take_out(self, rows: list[int]) -> None:
         """Nothing stays written of some motions of the stretch that was taken last."""
-        if rows:
-            self.parts[-1] = self.parts[-1].outside(self.program.blocks[self.moves.block[rows]])
-            self.added -= int(np.diff(self.first_piece)[rows].sum()) - len(rows)
+        self.parts[-1] = self.parts[-1].outside(self.program.blocks[self.moves.block[rows]])
+        self.added -= int(np.diff(self.first_piece)[rows].sum()) - len(rows)
 
     def _steps_for(self, decimals: IntArray) -> OutputSteps:
         return OutputSteps(self.text, decimals, _halves(decimals), self.layouts.spelling.signed)
@@ -229,7 +230,7 @@ class Bulk:
             return lines * line
         several = np.diff(pieces) - 1
         rows = blocks[several > 0].astype(np.int64)
-        leads = self.layouts.lead_ends(self.program, rows) - self.program.blocks[rows, 0]
+        leads = places_of(self.program, rows, self.layouts.leads) - self.program.blocks[rows, 0]
         return lines * line + int((several[several > 0] * leads).sum())
 
 
@@ -237,12 +238,6 @@ def _stops(fit: Mask) -> IntArray:
     """(n + 1,) for each motion, and behind the last one, the first from there on that is not `fit` (n,)."""
     ends = np.append(np.flatnonzero(~fit), len(fit))
     return np.repeat(ends, np.diff(ends, prepend=-1))
-
-
-def _silenced(moves: Moves) -> Mask:
-    """(n - 1,) motions but the first in which an axis must get no word that might have got one in the motion before."""
-    wordless = moves.wordless
-    return np.asarray((wordless[1:] & ~wordless[:-1]).any(axis=1))
 
 
 def _halves(decimals: IntArray) -> FloatArray:

@@ -36,7 +36,9 @@ def sound(moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
     """(n,) motions that are corrected, from absolute words to where all is known."""
     first = first_piece[:-1]
     fit: Mask = (moves.rule == Rule.CORRECT) & ~moves.incremental & ~pieces.unchanged[first] & pieces.known[first]
-    fit &= _undisplaced(moves, pieces, first_piece)
+    wordless = moves.wordless
+    if wordless.any():  # such axes must stand where the program believes them to be
+        fit &= ~(wordless & (pieces.end.take(first_piece[1:] - 1, axis=0) != moves.end)).any(axis=1)
     return fit
 
 
@@ -57,16 +59,6 @@ def with_dwells(
     found = fit.copy()
     found[rows] = True
     return found
-
-
-def _undisplaced(moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
-    """(n,) motions in which axes that must get no word stand where the program believes them to be."""
-    wordless = moves.wordless
-    if not wordless.any():
-        return np.ones(len(moves), dtype=np.bool_)
-    last = first_piece[1:] - 1
-    fine: Mask = ~(wordless & (pieces.end.take(last, axis=0) != moves.end)).any(axis=1)
-    return fine
 
 
 def _writable_pieces(program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts) -> Mask:

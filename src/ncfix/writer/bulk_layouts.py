@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.control.moves import Moves
-from ncfix.text.language import ArcLayout, BulkLayout
+from ncfix.text.language import BulkLayout
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
 from ncfix.text.spelling import Spelling
 from ncfix.text.tree import START, Program
@@ -130,26 +130,18 @@ class Layouts:
             self.leads[shape] = layout.lead
         for table, text in ((self.openings, layout.opening), (self.closings, layout.closing)):
             table[shape, : len(text)] = list(text.encode("latin-1"))
-        if layout.arc is not None:
-            self._enter_arc(shape, layout, layout.arc)
-
-    def _enter_arc(self, shape: int, layout: BulkLayout, arc: ArcLayout) -> None:
-        """Fill in what the row of a shape says about arcs."""
-        self.round[shape], self.alone[shape] = True, arc.alone
-        self.centre[shape] = [arc.centre.get(letter, NONE) for letter in CENTRE_LETTERS]
-        self.fixed[shape] = [letter in arc.fixed for letter in CENTRE_LETTERS]
-        letters = [letter.lower() if layout.lower else letter for letter in CENTRE_LETTERS]
-        self.centre_heads[shape] = [(ord(layout.blank or "\0"), ord(letter)) for letter in letters]
-        if arc.radius is not None:
-            self.radius[shape], self.taken[shape] = arc.radius
+        if (arc := layout.arc) is not None:
+            self.round[shape], self.alone[shape] = True, arc.alone
+            self.centre[shape] = [arc.centre.get(letter, NONE) for letter in CENTRE_LETTERS]
+            self.fixed[shape] = [letter in arc.fixed for letter in CENTRE_LETTERS]
+            letters = [letter.lower() if layout.lower else letter for letter in CENTRE_LETTERS]
+            self.centre_heads[shape] = [(ord(layout.blank or "\0"), ord(letter)) for letter in letters]
+            if arc.radius is not None:
+                self.radius[shape], self.taken[shape] = arc.radius
 
     def places(self, program: Program, blocks: IntArray) -> IntArray:
         """The bytes of `blocks` (k,) at which missing words go."""
         return places_of(program, blocks, self.anchors)
-
-    def lead_ends(self, program: Program, blocks: IntArray) -> IntArray:
-        """The bytes up to which lines of further pieces repeat `blocks` (k,)."""
-        return places_of(program, blocks, self.leads)
 
 
 def places_of(program: Program, blocks: IntArray, anchors: IntArray) -> IntArray:

@@ -194,16 +194,13 @@ class _Emitter:
         self.start[row] = self.position
         self.start[row + 1 : stop] = ends.take(self.first_piece[row + 1 : stop] - 1 - first, axis=0)
         self.in_stretch[row:stop], self.cycle_end = True, None
-        self._write_alone(row, stop)
+        alone = write_alone(self.bulk.alone(row, stop), stop, self.start, self.moves.programmed, self._written)
+        if alone:
+            self.in_stretch[alone] = False
+            self.bulk.take_out(alone)
+        self.replaced = self.replaced if stop - 1 in alone[-1:] else None
         self.position = self.end[first + len(ends) - 1].copy()
         return stop - row
-
-    def _write_alone(self, row: int, stop: int) -> None:
-        """Write the arcs of a stretch that `BlockWriter` has to write."""
-        rows = write_alone(self.bulk.alone(row, stop), stop, self.start, self.moves.programmed, self._written)
-        self.in_stretch[rows] = False
-        self.replaced = self.replaced if stop - 1 in rows[-1:] else None
-        self.bulk.take_out(rows)
 
     def _written(self, row: int) -> FloatArray:
         """Write a motion by itself from its start on; the command at its end."""
@@ -275,12 +272,6 @@ class _Emitter:
             self.conflicts[self.replaced_by] = MODE_LOST
         self.replaced = None
 
-    def _note_code(self, row: int, code: int) -> None:
-        """Note the motion code in force where it is not the program's own."""
-        own = int(self.moves.modal[row])
-        self.replaced = code if code != own and code in STRAIGHT_AND_ARCS else None
-        self.replaced_by = int(self.moves.block[row])
-
     # -- writing a motion ---------------------------------------------------------------------------------------------
 
     def _write(self, row: int) -> None:
@@ -311,7 +302,9 @@ class _Emitter:
         still = frame.still(ends[-1] == target.start)
         self.position = np.where(still, self._before(row), self.end[rows.stop - 1])
         self.end[rows.stop - 1] = self.position
-        self._note_code(row, rendered.code_behind(target))
+        code = target.last_code if rendered.code is None else rendered.code
+        self.replaced = code if code != int(self.moves.modal[row]) and code in STRAIGHT_AND_ARCS else None
+        self.replaced_by = block
         if block not in self.written:
             self.written[block] = rendered
             self.latest.append(block)

@@ -195,10 +195,6 @@ class Rendered:
     opens: bool = False
     closing: str = ""
 
-    def code_behind(self, target: Target) -> int:
-        """The motion code that is in force behind the block, in tenths."""
-        return target.last_code if self.code is None else self.code
-
     def lines_before(self, next_block: Rendered | None) -> list[str]:
         """The lines to put after the block, where that is what is written of the next one; None: nothing."""
         called = next_block is not None and next_block.opens

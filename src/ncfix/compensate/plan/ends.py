@@ -80,8 +80,11 @@ def standing(
         first = np.zeros((1, shift.shape[1])) if before is None else before[None]
         left = _carried(shift, decides, first)
         return EndCommands(moves.start + left[:-1], moves.end + left[1:])
-    back = _gone_back(moves)
-    restarts = _restarts(moves, back)
+    back, restarts = (np.zeros(moves.start.shape, dtype=bool) for _ in range(2))
+    back[:-1] = (moves.start[1:] == moves.start[:-1]) & (moves.end[:-1] != moves.start[:-1])
+    back &= (moves.kind == MotionKind.CYCLE)[:, None]  # a canned cycle has returned to where it started
+    same: Mask = (moves.start[1:] == moves.end[:-1]) | (np.isnan(moves.start[1:]) & np.isnan(moves.end[:-1]))
+    restarts[1:] = ~same & ~back[:-1]  # the control has taken an axis elsewhere itself
     jumps, risen = _risen(moves, approaches)
     back[:-1] &= ~risen[1:]
     restarts |= risen
@@ -136,14 +139,6 @@ def _filled(
     return filled[1::2], at_end, filled[-1]
 
 
-def _gone_back(moves: Moves) -> Mask:
-    """Axes along which a canned cycle returns to where it started, (n, n_axes)."""
-    back = np.zeros(moves.start.shape, dtype=bool)
-    back[:-1] = (moves.start[1:] == moves.start[:-1]) & (moves.end[:-1] != moves.start[:-1])
-    back &= (moves.kind == MotionKind.CYCLE)[:, None]
-    return back
-
-
 def _risen(moves: Moves, approaches: Array | None) -> tuple[Array, Mask]:
     """Where motions start at the level from which the cycle before them fed, and how far that is off, (n, n_axes)."""
     off, risen = np.zeros(moves.start.shape), np.zeros(moves.start.shape, dtype=bool)
@@ -152,14 +147,6 @@ def _risen(moves: Moves, approaches: Array | None) -> tuple[Array, Mask]:
         risen[1:] = at_level & np.isfinite(approaches[:-1])
         off[1:][risen[1:]] = (approaches - moves.approach)[:-1][risen[1:]]
     return off, risen
-
-
-def _restarts(moves: Moves, back: Mask) -> Mask:
-    """Axes that do not start where the motion before left them: the control has taken them elsewhere itself."""
-    restarts = np.zeros(moves.start.shape, dtype=bool)
-    same: Mask = (moves.start[1:] == moves.end[:-1]) | (np.isnan(moves.start[1:]) & np.isnan(moves.end[:-1]))
-    restarts[1:] = ~same & ~back[:-1]
-    return restarts
 
 
 def _runs(moves: Moves) -> list[slice]:

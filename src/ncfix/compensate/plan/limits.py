@@ -57,7 +57,10 @@ def beyond_ranges(written: WrittenPieces) -> tuple[Finding, Finding]:
     """
     programmed, corrected = programmed_excess(written), _corrected_excess(written)
     if (corrected > FUZZ).any():
-        either = np.fmax(programmed, _begun_beyond(written, corrected))
+        each = np.flatnonzero((corrected > FUZZ).any(axis=1))
+        begun = np.full(corrected.shape, -np.inf)  # how far motions begin beyond ranges, if they end there
+        begun[each] = _beyond(written.intent.machine, written.intent.joints_at(each, np.zeros(len(each))))
+        either = np.fmax(programmed, np.where(corrected > FUZZ, begun, -np.inf))
         corrected[either > FUZZ] = -np.inf
         programmed = np.where(some(programmed > FUZZ)[:, None], programmed, either)
     outside = "axis {axis} goes {value:.4g} {unit} beyond the range over which its errors are known, {range}"
@@ -75,14 +78,6 @@ def increments_beyond_travel(written: WrittenPieces) -> Index:
     if (beyond > FUZZ).any():
         beyond[programmed_excess(written) > FUZZ] = -np.inf
     return rows[(beyond[rows] > FUZZ).any(axis=1)]
-
-
-def _begun_beyond(written: WrittenPieces, corrected: Array) -> Array:
-    """(n, n_axes) how far motions begin beyond ranges, where a block of theirs ends there; -inf elsewhere."""
-    each = np.flatnonzero((corrected > FUZZ).any(axis=1))
-    begun = np.full(corrected.shape, -np.inf)
-    begun[each] = _beyond(written.intent.machine, written.intent.joints_at(each, np.zeros(len(each))))
-    return np.where(corrected > FUZZ, begun, -np.inf)
 
 
 def _corrected_excess(written: WrittenPieces) -> Array:

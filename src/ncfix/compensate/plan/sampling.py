@@ -46,7 +46,10 @@ def bends(intent: Intent, rows: Index) -> Array:
         way[swung[:, None], intent.columns] += (reach(intent, rows[swung]) * angle)[:, None]
     arcs = np.flatnonzero(intent.segments.arc[rows])
     if arcs.size:
-        way[arcs[:, None], intent.columns] += _arc_ways(intent, rows[arcs])
+        on = rows[arcs]
+        in_plane = np.sqrt(np.maximum(1 - moves.normal[on] ** 2, 0.0))
+        along = arc_radii(intent, on) * np.abs(moves.sweep[on])
+        way[arcs[:, None], intent.columns] += along[:, None] * in_plane
     way /= features(machine)
     count: Array = way.sum(axis=1)
     count[arcs] += np.abs(moves.sweep[rows[arcs]]) / EIGHTH
@@ -92,13 +95,6 @@ def reach(intent: Intent, rows: Index) -> Array:
     fixed = max(points, default=0.0) + float(np.linalg.norm(machine.workpiece_offset))
     tip = np.maximum(*(np.linalg.norm(end[rows][:, intent.columns], axis=1) for end in (moves.start, moves.end)))
     return tip + fixed + np.abs(moves.tool_length[rows])
-
-
-def _arc_ways(intent: Intent, rows: Index) -> Array:
-    """What X Y Z move along arcs, (k, 3) mm, from above."""
-    moves = intent.moves
-    in_plane = np.sqrt(np.maximum(1 - moves.normal[rows] ** 2, 0.0))
-    return (arc_radii(intent, rows) * np.abs(moves.sweep[rows]))[:, None] * in_plane
 
 
 def arc_radii(intent: Intent, rows: Index) -> Array:
