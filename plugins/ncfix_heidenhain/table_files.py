@@ -103,7 +103,8 @@ def read_table(remarks: Remarks, content: bytes) -> TextTable | None:
         return None
     head = body.pop(0)[1]
     columns = _columns(head)
-    _look_for_tabs(remarks)
+    if tabbed := next((number for number, row in enumerate(remarks.rows, 1) if "\t" in row), 0):
+        remarks.refuse(tabbed, "a tab: columns are counted in characters")
     rows = tuple(_cells(remarks, cell_number, line, columns) for cell_number, line in body)
     eol = "\r\n" if b"\r\n" in content else "\n"
     return TextTable(begin, columns, rows, tuple(n for n, _ in body), ended, head.endswith(" "), eol)
@@ -129,13 +130,6 @@ def _cells(remarks: Remarks, cell_number: int, line: str, columns: Sequence[Tabl
     if len(cells[-1].split()) > 1:
         remarks.refuse(cell_number, "more cells than there are columns")
     return tuple(cells)
-
-
-def _look_for_tabs(remarks: Remarks) -> None:
-    for cell_number, row in enumerate(remarks.rows, 1):
-        if "\t" in row:
-            remarks.refuse(cell_number, "a tab: columns are counted in characters")
-            return
 
 
 def cell_number(remarks: Remarks, line: int, cell: str, name: str) -> float:

@@ -162,21 +162,12 @@ def _look_across(folder: Folder, remarks: Remarks) -> None:
         plain = not table.multiply and table.index + 1 not in pointed and not offsets
         if plain and table.input == table.output and table.output in own:
             remarks.doubt(0, f"{table.output} over itself is corrected twice, by table {table.index + 1} and by EEC")
-    _look_at_limits(folder, remarks)
-    _look_at_pairs(folder.cec, remarks)
-
-
-def _look_at_limits(folder: Folder, remarks: Remarks) -> None:
     for key, count in (("tables", len(folder.cec)), ("points", max((len(t.values) for t in folder.cec), default=0))):
         most = folder.said.get(f"most_{key}", "")
         if most.isdecimal() and count > int(most):
             remarks.refuse(0, f"{count} {key}, and the control has {most}", "a smaller range, fewer tables, or fix")
-
-
-def _look_at_pairs(tables: tuple[CecTable, ...], remarks: Remarks) -> None:
-    """Two tables for the two ways of one axis belong together."""
     ways: dict[tuple[str, str, int], set[int]] = {}
-    for table in tables:
+    for table in folder.cec:
         ways.setdefault((table.input, table.output, table.multiply), set()).add(table.direction)
     for (source, output, _), found in ways.items():
         if found in ({1}, {-1}):

@@ -59,7 +59,12 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
         control.length_code = 0
     else:
         control.length_code = code
-        take_number(control, block)
+        if "H" in block.values:
+            control.length_number = whole(block.values["H"], "H")
+        elif control.length_number is not None:
+            block.values["H"] = float(control.length_number)
+        else:
+            control.warn(NO_NUMBER, SPINDLE, "state H in the block of G43")
         if control.modal.plane.across != Z:
             control.warn(AXES_SAID, ALONG_Z, "check along which axis it acts (Fanuc: parameter 5001 TLB)")
         turned = any(abs(control.position[i]) > NOTHING for i in control.turning)
@@ -103,16 +108,6 @@ def z_is_named_first(control: MacroControl) -> bool:
         if words & MOVING or not CALLS.isdisjoint(shape.m_codes):
             return False
     return False
-
-
-def take_number(control: MacroControl, block: Block) -> None:
-    """H of the block, or that in force; a program that has never named one means the tool in the spindle."""
-    if "H" in block.values:
-        control.length_number = whole(block.values["H"], "H")
-    elif control.length_number is not None:
-        block.values["H"] = float(control.length_number)
-    else:
-        control.warn(NO_NUMBER, SPINDLE, "state H in the block of G43")
 
 
 def lone_number(control: MacroControl, block: Block, codes: Codes) -> None:

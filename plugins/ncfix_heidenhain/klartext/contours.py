@@ -78,7 +78,9 @@ def worked_out(
     blocks = list(blocks_of_contour(unit, first))
     keys = [(unit.external, block) for block in blocks]
     control.use_start_positions((X, Y))
-    lost = X in control.unknown or Y in control.unknown or changes_pole(control)
+    path = control.path  # arcs are written about poles of their own: could the one in force not be put back?
+    other = path.pole is not None and (path.plane != PLANES[170] or path.pole_in != pole_frame(control))
+    lost = X in control.unknown or Y in control.unknown or other
     if lost or control.cycle.modal or any(unit.plan(block).skip for block in blocks):
         return dict.fromkeys(keys)
     elements = [element_of(control, statement_text(unit, block)) for block in blocks]
@@ -104,12 +106,6 @@ def statement_text(unit: KlartextUnit, block: int) -> str:
     statement = unit.plan(block).statement
     assert statement is not None
     return LEFT_OUT.sub(" ", unit.program.slice(block, statement[1])).strip()
-
-
-def changes_pole(control: KlartextControl) -> bool:
-    """Whether the pole in force could not be put back after arcs that are written about poles of their own."""
-    path = control.path
-    return path.pole is not None and (path.plane != PLANES[170] or path.pole_in != pole_frame(control))
 
 
 def heading_of(control: KlartextControl) -> complex | None:

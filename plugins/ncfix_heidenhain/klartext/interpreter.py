@@ -38,7 +38,7 @@ from ncfix_heidenhain.klartext.statements import (
     define_tool,
     statement,
 )
-from ncfix_heidenhain.klartext.targets import MotionWords, axis_letters, set_pole
+from ncfix_heidenhain.klartext.targets import MotionWords, set_pole
 from ncfix_heidenhain.klartext.units import KlartextUnit
 
 if TYPE_CHECKING:
@@ -310,7 +310,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
     def note_foreign(self, plan: KlartextPlan, step: Step) -> None:
         """Note axes that the program moves and the machine lacks."""
         control = self.control
-        for letter in axis_letters(step.words):
+        for letter in step.words.letters:
             if control.path.spatial and letter in "ABC":
                 continue
             if INDEX[letter] not in control.machine and letter not in control.foreign:

@@ -113,7 +113,8 @@ def _of_shape(shape: Shape) -> tuple[KlartextLayout, Word | None] | None:
     function = next((command for command in commands if opens_block(command.name)), None)
     axes = {word.address.removeprefix("I"): word for word in among(words, AXIS_WORDS)}
     polar, vector = among(words, POLAR), {word.address: word for word in among(words, VECTOR)}
-    if 0 < len(vector) < 3 or has_computed_angle(polar):
+    computed = any(word.address == "IPA" and not isinstance(word.value, Literal) for word in polar)
+    if computed or 0 < len(vector) < 3:
         return None
     last = max([*axes.values(), *polar], key=lambda word: word.span.stop, default=None)
     end = last or function
@@ -139,11 +140,6 @@ def _of_shape(shape: Shape) -> tuple[KlartextLayout, Word | None] | None:
 def among(words: Sequence[Word], addresses: Collection[str]) -> tuple[Word, ...]:
     """The words with one of these addresses."""
     return tuple(word for word in words if word.address in addresses)
-
-
-def has_computed_angle(polar: Sequence[Word]) -> bool:
-    """Whether the angle of a CP is no plain number."""
-    return any(word.address == "IPA" and not isinstance(word.value, Literal) for word in polar)
 
 
 def acts_late(word: Word) -> bool:

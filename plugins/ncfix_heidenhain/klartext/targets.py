@@ -40,34 +40,24 @@ class MotionWords:
     @property
     def axes(self) -> int:
         """A bit mask of the axes that have a word; polar words stand for those of the plane (see `polar_axes`)."""
-        return _axes_of(tuple(self.values))
+        return _said(tuple(self.values))[0]
 
     @property
     def incremental(self) -> bool:
         """Some word counts from where the axis stands."""
-        return _counts_on(tuple(self.values))
+        return _said(tuple(self.values))[1]
 
-
-def axis_letters(words: MotionWords) -> tuple[str, ...]:
-    """The axes that have a word."""
-    return _letters_of(tuple(words.values))
-
-
-@lru_cache(maxsize=1024)
-def _axes_of(addresses: tuple[str, ...]) -> int:
-    letters = {address.removeprefix("I") for address in addresses if address not in ("PA", "PR", "IPA", "IPR")}
-    return mask_of(INDEX[letter] for letter in letters if letter in INDEX)
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """The axes that have a word."""
+        return _said(tuple(self.values))[2]
 
 
 @lru_cache(maxsize=1024)
-def _counts_on(addresses: tuple[str, ...]) -> bool:
-    return any(address[0] == "I" for address in addresses)
-
-
-@lru_cache(maxsize=1024)
-def _letters_of(addresses: tuple[str, ...]) -> tuple[str, ...]:
-    letters = (address.removeprefix("I") for address in addresses)
-    return tuple(letter for letter in letters if letter in INDEX)
+def _said(addresses: tuple[str, ...]) -> tuple[int, bool, tuple[str, ...]]:
+    """What the addresses of words say: `axes`, `incremental` and `letters` of `MotionWords`."""
+    letters = tuple(letter for address in addresses if (letter := address.removeprefix("I")) in INDEX)
+    return mask_of({INDEX[letter] for letter in letters}), any(address[0] == "I" for address in addresses), letters
 
 
 @mutable

@@ -60,12 +60,6 @@ class Plane:
         """Those of its two axes, among values of all axes."""
         return values[self.first], values[self.second]
 
-    def in_space(self, point: tuple[float, float]) -> Vector:
-        """A point of it as X, Y and Z."""
-        space = [0.0, 0.0, 0.0]
-        space[self.first], space[self.second] = point
-        return space
-
 
 PLANES = {
     170: Plane(170, X, Y, Z),

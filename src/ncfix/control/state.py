@@ -292,7 +292,8 @@ class ControlState(ABC):
         centre  from the start of the arc, in a plane of the program's frame, mm
         sweep   rad, as the commands turn
         """
-        away, normal = plane.in_space(centre), IDENTITY[plane.across]
+        away, normal = [0.0, 0.0, 0.0], IDENTITY[plane.across]
+        away[plane.first], away[plane.second] = centre
         if self.is_rotated:
             away = rotated(self.rotation, away)
             a, b, c = (dot(row, normal) for row in self.rotation)
