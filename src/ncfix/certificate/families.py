@@ -332,7 +332,9 @@ class WordAddressFollower(AxisFollower):
                 case "T":
                     self.next_tool = word.number.strip('"').upper() if word.value is None else int(word.value)
                     if self.family is Family.SINUMERIK:
-                        self._change()
+                        self.tool = self.next_tool  # in the spindle; its length holds at once where one was in force
+                        self.choose_edge(1)
+                        self.unsay()
                 case "D" if self.family is Family.SINUMERIK:
                     self.choose_edge(word.value)
                 case "M":
@@ -366,12 +368,6 @@ class WordAddressFollower(AxisFollower):
         name = word.name.partition("(")[0].strip()
         if not word.number and not WORDS_QUIET.fullmatch(name) and not name.startswith(("%", "_N_", "$")):
             self.lost[name] = f"{name} is not known to this reader"
-
-    def _change(self) -> None:
-        """Another tool in the spindle of a SINUMERIK; its length holds at once where one was in force."""
-        self.tool = self.next_tool
-        self.choose_edge(1)
-        self.unsay()
 
     def _system(self, name: str) -> None:
         if name != self.system:

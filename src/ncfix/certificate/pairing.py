@@ -180,10 +180,12 @@ class Pairing:
         row, astray = i, False
         while row < end:
             count = min(end - row, stop - j) - 1
-            if count > SEVERAL and (count := self._one_by_one(row, j, count)):
+            near = count > SEVERAL and all(self.nearness(row + k, j + k) for k in range(SEVERAL))
+            if near and (count := self.run_of(row, j, count)):  # one line each, from here on
                 self.pairs.append_run(row, j, count)
                 row, j, astray = row + count, j + count, False
-            if more > 0 and not self.followed(row) and not self._says_the_same(row, j, stop):
+            unfollowed = more > 0 and not self.followed(row)
+            if unfollowed and not (j < stop and self.original.lines[row].says(self.corrected.lines[j])):
                 astray = True  # until a line leads where it should
             if astray:
                 self.unsure.add(row)
@@ -202,9 +204,6 @@ class Pairing:
             self._extra(j, stop)
         return end, stop
 
-    def _says_the_same(self, row: int, at: int, stop: int) -> bool:
-        return at < stop and self.original.lines[row].says(self.corrected.lines[at])
-
     def _last_piece(self, row: int, first: int, more: int, stop: int) -> int:
         """The last of the lines that stand for one; what puts a feed or a pole back stands behind its last piece."""
         last = self._last(row, first, first + max(more, 0), min(stop, first + AHEAD))
@@ -215,10 +214,6 @@ class Pairing:
         feed = not behind.path and following.path != []
         pole = _begins(behind, "CC") and _begins(ours[row], *ARCS)
         return last + (feed or (pole and not _begins(following, "CC", *ARCS)))  # a pole before an arc belongs to that
-
-    def _one_by_one(self, row: int, at: int, count: int) -> int:
-        """How many of so many lines have one line each in their place, from these on; a few may be left out."""
-        return self.run_of(row, at, count) if all(self.nearness(row + k, at + k) for k in range(SEVERAL)) else 0
 
     def _is_gone(self, row: int, at: int, end: int) -> bool:
         """Whether a line is not there any more: the next one leads where its correction should, and it does not."""

@@ -57,7 +57,8 @@ def findings() -> Iterator[HostFinding]:
         "computer", f"{platform.platform()}, {console.counted(host.processors(), 'processor')} to be used"
     )
     yield from _packages()
-    yield _core()
+    stale = core.fault() and core.has_binary()  # it is not of these sources
+    yield HostFinding("core", core.status(), core.fault() if stale else "")
     yield from _plugins()
     yield from _caches()
     yield _temporary()
@@ -102,12 +103,6 @@ def _version(name: str) -> str | None:
 
 def _numbers(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in re.findall(r"\d+", text)[:3])
-
-
-def _core() -> HostFinding:
-    """Whether the compiled core is used; one that is not of these sources is wrong."""
-    stale = core.fault() and core.has_binary()
-    return HostFinding("core", core.status(), core.fault() if stale else "")
 
 
 def _plugins() -> Iterator[HostFinding]:

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from ncfix.machine import Machine
-    from ncfix.tables.control import Control, Written
+    from ncfix.tables.control import Control
     from ncfix.tables.export import Exported
 
 
@@ -112,7 +112,10 @@ def export(
     if probe:
         found = called("controls", chosen.name, chosen.probe, request, gives=Written)
         files.write_folder(output, found.files, force, inputs)
-        _tell_of_probe(found, chosen.name, as_json)
+        if as_json:
+            console.put_json(control=chosen.name, files=sorted(found.files), notes=found.notes)
+        else:
+            console.put("".join(f"{name}\n" for name in sorted(found.files)))
         return ExitCode.DONE
     with console.busy("making tables"):
         made = exported(chosen, request)
@@ -154,13 +157,6 @@ def _pair(text: str, form: str) -> tuple[str, str]:
     if not equals or not name:
         raise click.UsageError(f"{text!r} should be {form}")
     return name.strip(), value.strip()
-
-
-def _tell_of_probe(written: Written, control: str, as_json: bool) -> None:
-    if as_json:
-        console.put_json(control=control, files=sorted(written.files), notes=written.notes)
-        return
-    console.put("".join(f"{name}\n" for name in sorted(written.files)))
 
 
 def tell(made: Exported, control: Control, as_json: bool) -> None:

@@ -302,6 +302,10 @@ class Tally:
         figures = options.verify
         after = self.after.as_dict(self.way, self.samples) | {"where": self.after.line}
         still = [] if self.moves else [each for each in messages if each.code == NEVER]
+        uncorrected = [  # if nothing in it moves, what was meant stays uncorrected
+            Refusal(each.place.line if each.place else 0, each.code, f"{each.text}; nothing else in it moves")
+            for each in still
+        ]
         report = FixReport(
             path=path,
             blocks=self.blocks,
@@ -313,7 +317,7 @@ class Tally:
             max_correction_um=self.largest * 1e3 if self.compensated else None,
             error_before_um=self.before.as_dict(self.way, self.samples) if figures else {},
             error_after_um=after if figures else {},
-            refused=(*self.refused, *map(_refused_whole, still)),
+            refused=(*self.refused, *uncorrected),
             warnings=(
                 *(each for each in messages if each not in still),
                 *self.notes.values(),
@@ -328,11 +332,6 @@ class Tally:
             no_figure=self.unseen,
         )
         return report.with_what_is_left(options.tolerance_um)
-
-
-def _refused_whole(said: Message) -> Refusal:
-    """Blocks that a program never goes through, if nothing in it moves: what was meant stays uncorrected."""
-    return Refusal(said.place.line if said.place else 0, said.code, f"{said.text}; nothing else in it moves")
 
 
 def refusals(program: Program, account: Account) -> list[Refusal]:

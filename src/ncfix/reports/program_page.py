@@ -65,6 +65,7 @@ class ProgramPage:
         columns, shift, strays = record.columns()
         script = f'<script src="{escape(beside)}{LIBRARY}"></script>' if beside is not None else _inside()
         name = report.path.replace("\\", "/").rsplit("/", 1)[-1]
+        written = f"written to {self.output}" if self.output else "nothing written"
         refused, passed = record.refused, record.passed
         lists = {
             "worst": self._worst(),
@@ -72,10 +73,11 @@ class ProgramPage:
             "passed": self._blocks("Passed by rule", passed, report.passed, PASSED),
         }  # fmt: skip
         axes, shown = self._axes(shift)
+        whole = np.maximum(record.share.sum(axis=1, keepdims=True), 1e-12)
         head = {
             "axes": axes,
             "edges": np.round(EDGES, 6).tolist(),
-            "share": dict(zip(("before", "after"), _percent(record.share), strict=True)),
+            "share": dict(zip(("before", "after"), np.round(100 * record.share / whole, 4).tolist(), strict=True)),
             "spots": [_flat(spot) for spot in self._spots],
             "source": self._source(),
         }
@@ -84,7 +86,7 @@ class ProgramPage:
             "from": "'self' file:" if beside is not None else "",
             "name": escape(name),
             "machine": escape(self.machine.name),
-            "subtitle": escape(self._subtitle()),
+            "subtitle": escape(f"{report.path} on {self.machine.name}, {self.options.strategy}; {written}"),
             "style": asset("page.css"),
             "cards": "".join(self._cards()),
             "said": self._said(),
@@ -98,10 +100,6 @@ class ProgramPage:
             "script": asset("theme.js") + asset("program.js"),
         }
         return filled("program.html", values)
-
-    def _subtitle(self) -> str:
-        written = f"written to {self.output}" if self.output else "nothing written"
-        return f"{self.report.path} on {self.machine.name}, {self.options.strategy}; {written}"
 
     def _cards(self) -> Iterator[str]:
         report = self.report
@@ -247,12 +245,6 @@ def _limit(name: str, found: Extent, rotary: bool, limit: float | None) -> list[
     meter = f'<i{" class=high" if share > HIGH else ""} style="width:{min(100 * share, 100):.1f}%"></i>'
     used = f'{100 * share:.1f} %<span class="meter">{meter}</span>'
     return [escape(name), low, high, unit, f"{factor * limit:g}", used, line]
-
-
-def _percent(share: Array) -> list[list[float]]:
-    """Lengths of path (2, k) as percent of all of it."""
-    total = np.maximum(share.sum(axis=1, keepdims=True), 1e-12)
-    return np.round(100 * share / total, 4).tolist()
 
 
 def _flat(spot: ListedPlace) -> dict[str, object]:

@@ -85,7 +85,9 @@ class Scan:
             shapes, group = distinct(keys)
         for block in apart:
             shapes[block] = None
-        return cls(shapes, comment, first_numbers(blocks, numbers.spans), numbers.spans, numbers.values, group)
+        starts = np.ascontiguousarray(numbers.spans[:, 0])
+        first = np.append(np.searchsorted(starts, blocks[:, 0]), len(starts))
+        return cls(shapes, comment, first, numbers.spans, numbers.values, group)
 
     @classmethod
     def joined(cls, parts: Sequence[tuple[int, Scan]]) -> Scan:
@@ -177,9 +179,10 @@ def in_slices(source: bytes, blocks: NDArray[np.int64], scan: PlainScan) -> Scan
 
 def scan_any(source: bytes, blocks: NDArray[np.int64], pointless: bool) -> Scan:
     """As `scan`, of any text, with numpy alone."""
-    starts, stops, last = comments_of(source)
-    comments = np.stack((starts, stops), axis=1)
-    return scan_beside(np.frombuffer(source, dtype=np.uint8), blocks, comments, comments[last], pointless=pointless)
+    found = [(*match.span(), match.start("last") >= 0) for match in matches(COMMENT, source, b"(;")]
+    comments = np.array(found, dtype=np.int64).reshape(-1, 3)
+    final = comments[comments[:, 2] != 0, :2]
+    return scan_beside(np.frombuffer(source, dtype=np.uint8), blocks, comments[:, :2], final, pointless=pointless)
 
 
 def scan_beside(
@@ -283,12 +286,6 @@ def blocks_at(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> list[int]
     return owner[places < blocks[owner, 1]].tolist()
 
 
-def first_numbers(blocks: NDArray[np.int64], numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(n + 1,) the first number of each block."""
-    starts = np.ascontiguousarray(numbers[:, 0])
-    return np.append(np.searchsorted(starts, blocks[:, 0]), len(starts))
-
-
 def firsts(counts: NDArray[np.int64]) -> NDArray[np.int64]:
     """The first number of each block (n,) with so many of them, and how many there are, (n + 1,)."""
     return np.concatenate(([0], np.cumsum(counts)))
@@ -297,13 +294,6 @@ def firsts(counts: NDArray[np.int64]) -> NDArray[np.int64]:
 def block_of(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.int64]:
     """The blocks in which some bytes of the text stand; those of a line end stand in the block before it."""
     return np.searchsorted(blocks[:, 0], places, side="right") - 1
-
-
-def comments_of(source: bytes) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-    """Start and stop of each comment, and whether it ends its block."""
-    found = [(*match.span(), match.start("last") >= 0) for match in matches(COMMENT, source, b"(;")]
-    columns = np.array(found, dtype=np.int64).reshape(-1, 3)
-    return columns[:, 0], columns[:, 1], columns[:, 2].astype(np.bool_)
 
 
 def matches(pattern: re.Pattern[bytes], source: bytes, heads: bytes) -> Iterator[re.Match[bytes]]:

@@ -93,7 +93,11 @@ class BlockWriter(BlockText):
         if self.dragged:
             self._time_of_turn(base, position)
         elif self.target.inverse_time and len(self.target.ends) > 1:
-            self._share_time()
+            # In G93 the pieces take shares of the time of the block, which its F has to say in a plain number.
+            if self.layout.feed is None or not math.isfinite(self._feed_share(0)):
+                self.out.conflict = NO_TIME
+            else:
+                self._rewrite(self.layout.feed, self._feed_share(0), FEED_DECIMALS)
         return position
 
     def _motion_code(self) -> None:
@@ -444,13 +448,6 @@ class BlockWriter(BlockText):
             self.out.lines[-1] += self.layout.blank + text
 
     # -- feeds --------------------------------------------------------------------------------------------------------
-
-    def _share_time(self) -> None:
-        """In G93 the pieces of a block take shares of its time, which its own F has to say in a plain number."""
-        if self.layout.feed is None or not math.isfinite(self._feed_share(0)):
-            self.out.conflict = NO_TIME
-        else:
-            self._rewrite(self.layout.feed, self._feed_share(0), FEED_DECIMALS)
 
     def _feed_share(self, piece: int) -> float:
         assert self.layout.feed is not None

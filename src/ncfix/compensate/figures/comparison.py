@@ -357,9 +357,6 @@ class RunningComparison:
             self._go_on()
         for match in self.matches[1:]:
             match.along.limit = self.limit
-        self._check_alike()
-
-    def _check_alike(self) -> None:
         meant, made = self.intended.cut, self.fixed.cut
         if (self.intended.count == 0) != (self.fixed.count == 0) or abs(meant - made) > UNLIKE * max(meant, made):
             text = f"the two programs do not cut the same: {meant:.3f} mm and {made:.3f} mm of path"

@@ -115,7 +115,9 @@ class PathRecord:
         mine = np.ones(len(moves), dtype=bool) if own is None else own
         lines = program.lines(moves.block)
         found = _Places.of(solution, mine & (moves.kind != MotionKind.DWELL))
-        kind, shown = _kinds(moves, solution), solution.shown(False)
+        kind = np.where(moves.kind == MotionKind.RAPID, RAPID, np.where(solution.unchanged, PASSED, CUT))
+        kind[solution.unchanged & np.isin(moves.block, list(solution.reasons))] = REFUSED
+        shown = solution.shown(False)
         self._count(found, shown)
         way = self.way + np.cumsum(found.weight)
         self.way = float(way[-1]) if len(way) else self.way
@@ -286,13 +288,6 @@ def _bent(written: WrittenPieces, which: Index) -> tuple[Index, Array]:
     )  # where a rapid has led a cut, and where all begins
     first = first[drawn[first] & np.isfinite(picked(segments.start, which[first])).all(axis=1)]
     return np.concatenate([which[first], inside[0]]), np.concatenate([np.zeros(len(first)), inside[1]])
-
-
-def _kinds(moves: Moves, solution: WrittenPlan) -> Array:
-    """(n,) what leads to places of motions."""
-    refused = np.isin(moves.block, np.fromiter(solution.reasons, dtype=np.int64, count=len(solution.reasons)))
-    kind = np.where(moves.kind == MotionKind.RAPID, RAPID, np.where(solution.unchanged, PASSED, CUT))
-    return np.where(solution.unchanged & refused, REFUSED, kind)
 
 
 def _said(reason: Reason) -> str:
