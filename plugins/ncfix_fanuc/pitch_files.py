@@ -139,22 +139,16 @@ def _pitch(remarks: Remarks, axis: str, axes: str, values: Mapping[int, Mapping[
         return None
     last = first + len(increments) - 1
     _check(remarks, found, first, last)
-    if found["turn"] and len(increments):
-        _check_turn(remarks, first, increments)
+    if found["turn"] and len(increments):  # the first point of a turn is the last one again: B-63980EN, p. 100
+        if total := increments[1:].sum():
+            remarks.refuse(0, f"the increments of a turn behind its first point add up to {total}, not to zero")
+        if increments[0] != increments[-1]:
+            text = f"point {first} has {increments[0]}, and point {last}, the same place, has {increments[-1]}"
+            remarks.doubt(0, text, "the same value for both")
     if remarks.wrong:
         return None
     reference, magnification = int(found["reference"]), int(found["magnification"])
     return Pitch(axis, first, increments, reference, magnification, found["interval"], found["turn"])
-
-
-def _check_turn(remarks: Remarks, first: int, increments: NDArray[np.int64]) -> None:
-    """The first point of a turn is the last one again: B-63980EN, p. 100."""
-    total = increments[1:].sum()
-    if total != 0:
-        remarks.refuse(0, f"the increments of a turn behind its first point add up to {total}, not to zero")
-    if increments[0] != increments[-1]:
-        text = f"point {first} has {increments[0]}, and point {first + len(increments) - 1}, the same place, "
-        remarks.doubt(0, f"{text}has {increments[-1]}", "the same value for both")
 
 
 def _check(remarks: Remarks, parameters: Mapping[str, float], first: int, last: int) -> None:

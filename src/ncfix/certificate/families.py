@@ -391,7 +391,10 @@ class WordAddressFollower(AxisFollower):
 
     def _fixed(self, row: int, line: TextLine, words: Mapping[str, TextWord], codes: Sequence[int]) -> AxisStep:
         """A motion in machine coordinates, or to a reference point."""
-        named = {axis: self._settled(word) for axis, word in words.items() if axis in self.at}
+        named = {axis: word for axis, word in words.items() if axis in self.at}
+        for axis, word in named.items():
+            if word.value is None:  # a variable, which may be known
+                named[axis] = word._replace(value=self.variables.get(word.number.upper()))
         if 280 in codes or 300 in codes:
             point = self.given.references.get("G28" if 280 in codes else "G30", {})
             end = dict(self.at)
@@ -404,10 +407,6 @@ class WordAddressFollower(AxisFollower):
         step = self.step(row, Kind.FIXED, end, line)
         self.unsay(tuple(named) or self.axes)
         return step
-
-    def _settled(self, word: TextWord) -> TextWord:
-        """A word whose value is that of a variable, if this is known."""
-        return word if word.value is not None else word._replace(value=self.variables.get(word.number.upper()))
 
     def _hole(self, row: int, line: TextLine, words: Mapping[str, TextWord]) -> AxisStep:
         """A drilling cycle at a place: in G17, with absolute words."""

@@ -221,13 +221,16 @@ def fix(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
     looks = diff or diff_motions
     outputs = _outputs(context, programs, Outputs(output, in_place, force, resume))
-    wanted = [] if looks else _targets(context, programs, outputs, (machine_path, *given.files), as_json or json_lines)
+    inputs, only = (machine_path, *given.files), group_of(context).programs
+    wanted = [] if looks else targets(programs, outputs, inputs, folders=True, only=only)
+    for target in wanted:
+        check_streams(JSON if as_json or json_lines else None, program=target)
     many = len(programs) > 1 or any(map(os.path.isdir, programs))
     pages: Pages | None = None
     if page is not None or plot is not None:
         from ncfix.cli.shop.pages import Pages
 
-        pages = Pages.of(page, plot, many, force, wanted, (machine_path, *given.files))
+        pages = Pages.of(page, plot, many, force, wanted, inputs)
     from ncfix.compensate import FixOptions
 
     if choices.pop("thesis"):
@@ -268,15 +271,6 @@ def _outputs(context: click.Context, programs: Sequence[str], asked: Outputs) ->
     if asked.resume and is_from_file(context, "resume") and outputs.folder(programs) is None:
         return replace(outputs, resume=False)
     return outputs
-
-
-def _targets(
-    context: click.Context, programs: Sequence[str], outputs: Outputs, files: Sequence[str | None], prints: bool
-) -> list[OutputTarget]:
-    wanted = targets(programs, outputs, files, folders=True, only=group_of(context).programs)
-    for target in wanted:
-        check_streams(JSON if prints else None, program=target)
-    return wanted
 
 
 def _changes(

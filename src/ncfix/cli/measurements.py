@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from ncfix.cli.targets import OutputTarget
     from ncfix.diagnosis.diagnosis import Diagnosis
     from ncfix.measure.calibrate import Prediction
-    from ncfix.measure.candidates import Room
     from ncfix.measure.estimate import Calibration
     from ncfix.measure.measurement import Measurement
     from ncfix.measure.plan import Planned
@@ -280,6 +279,7 @@ def plan(
     as_json: bool,
 ) -> None:
     """Choose the poses to be measured, and write them as a measurement file to be filled in."""
+    from ncfix.measure.candidates import Room
     from ncfix.measure.measurement import dumps
     from ncfix.measure.plan import skeleton
     from ncfix.measure.reader import reads
@@ -291,7 +291,9 @@ def plan(
     machine = load_machine(machine_path)
     before = reads(read(existing), machine, shown(existing)) if existing else None
     names = [name.strip() for name in separate.split(",")] if separate else []
-    room = _room(ranges, lengths, balls, reaches, inputs)
+    stand = {name: (at[0], at[1], at[2]) for name, at in (_named(text, 3, "--ball") for text in balls)}
+    travels, space, others = _limits(ranges, "--range"), _limits(reaches, "--reach"), _limits(inputs, "--input")
+    room = Room(travels, lengths or (100.0,), stand, space, others)
     with console.busy("choosing poses"):
         found = ncfix.plan(
             machine, kind=kind, count=count, room=room, effects=effects, separate=names, existing=before, seed=seed
@@ -322,20 +324,6 @@ def _say(planned: Planned, *, separated: bool) -> None:
         console.say(
             "more poses may tell it, another kind of measurement or another tool; or seek fewer effects (--effects)"
         )
-
-
-def _room(
-    ranges: tuple[str, ...],
-    lengths: tuple[float, ...],
-    balls: tuple[str, ...],
-    reaches: tuple[str, ...],
-    inputs: tuple[str, ...],
-) -> Room:
-    from ncfix.measure.candidates import Room
-
-    places = {name: (at[0], at[1], at[2]) for name, at in (_named(text, 3, "--ball") for text in balls)}
-    given = _limits(ranges, "--range"), _limits(reaches, "--reach"), _limits(inputs, "--input")
-    return Room(given[0], lengths or (100.0,), places, given[1], given[2])
 
 
 def _limits(texts: tuple[str, ...], option: str) -> dict[str, tuple[float, float]]:

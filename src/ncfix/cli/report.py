@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -149,11 +148,12 @@ def _check_depth(found: Any) -> None:
     """Raise RecursionError if lists and objects lie deeper in one another than those of any result."""
     level = [found]
     for _ in range(DEEPEST):
-        level = [item for each in level if isinstance(each, (dict, list)) for item in _items(each)]
+        level = [
+            item
+            for each in level
+            if isinstance(each, (dict, list))
+            for item in (each.values() if isinstance(each, dict) else each)
+        ]
         if not level:
             return
     raise RecursionError
-
-
-def _items(nested: dict[str, Any] | list[Any]) -> Iterable[Any]:
-    return nested.values() if isinstance(nested, dict) else nested

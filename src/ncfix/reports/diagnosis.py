@@ -108,10 +108,6 @@ def _chance(p: float) -> str:
     return f"p {'=' if p > LEAST else 'below'} {max(p, LEAST):.1g}"
 
 
-def _p(value: float) -> str:
-    return f"{value:.1g}" if value > LEAST else f"less than {LEAST:g}"
-
-
 def _moved(diagnosis: Diagnosis) -> Iterator[Part]:
     """What the file says otherwise of where axes lie, and of gains."""
     if diagnosis.moved:
@@ -260,7 +256,14 @@ def _component(diagnosis: Diagnosis, effect: Effect) -> Iterator[Part]:
 
 
 def _where(diagnosis: Diagnosis) -> ReportSection:
-    rows = [(pattern.text, f"{pattern.rms_um:.1f}", f"{_p(pattern.p_value)}") for pattern in diagnosis.patterns]
+    rows = [
+        (
+            pattern.text,
+            f"{pattern.rms_um:.1f}",
+            f"{pattern.p_value:.1g}" if pattern.p_value > LEAST else f"less than {LEAST:g}",
+        )
+        for pattern in diagnosis.patterns
+    ]
     return ReportSection("Where", [Table(("pattern", "um rms", "p by chance"), rows)] if rows else [])
 
 

@@ -366,7 +366,10 @@ class Batch:
             return
         with Journal.opened(self.folder) as journal:
             job = self.job.noted_in(journal.path)
-            targets = [self._known(target, journal) for target in self.targets]
+            targets = []  # know what ncfix has written there; another worker may take over at any moment
+            for each in self.targets:
+                made = journal.made(each.name, each.source) if self.resume else frozenset[str]()
+                targets.append(replace(each, made=made, resume=True))
             before = {target: record for target in targets if (record := self._record_of(job, target, journal))}
             rest = [target for target in targets if target not in before]
             fresh = self._fresh(job, rest, jobs, make, partial(_note, journal, repr(job.limits)))
@@ -390,11 +393,6 @@ class Batch:
                 reporter.report(outcome.entry, lines)
                 step()
                 yield outcome
-
-    def _known(self, target: OutputTarget, journal: Journal) -> OutputTarget:
-        """A target that knows what ncfix has written there, and which another worker may take over at any moment."""
-        made = journal.made(target.name, target.source) if self.resume else frozenset[str]()
-        return replace(target, made=made, resume=True)
 
     def _record_of(self, job: FixJob, target: OutputTarget, journal: Journal) -> JournalRecord | None:
         """The record of a program that need not be fixed again; None if it is to be fixed."""
