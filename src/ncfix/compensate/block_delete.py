@@ -373,20 +373,12 @@ def _starting_elsewhere(moves: Sequence[Moves]) -> set[int]:
     """The blocks whose motions do not start at the same places in all positions in which they are executed."""
     starts, elsewhere = dict[int, bytes](), set[int]()
     for own in moves:
-        for block, start in _starts(own).items():
-            if starts.setdefault(block, start) != start:
-                elsewhere.add(block)
+        found, places = defaultdict[int, bytes](bytes), np.round(own.start, GRAIN) + 0.0
+        places[np.isnan(places)] = np.nan
+        for block, place in zip(own.block.tolist(), places, strict=True):
+            found[block] += place.tobytes()
+        elsewhere |= {block for block, start in found.items() if starts.setdefault(block, start) != start}
     return elsewhere
-
-
-def _starts(moves: Moves) -> Mapping[int, bytes]:
-    """Block -> where its motions start, one after the other."""
-    found = defaultdict[int, bytes](bytes)
-    places = np.round(moves.start, GRAIN) + 0.0
-    places[np.isnan(places)] = np.nan
-    for block, start in zip(moves.block.tolist(), places, strict=True):
-        found[block] += start.tobytes()
-    return found
 
 
 # -- the proof in all positions ----------------------------------------------------------------------------------------

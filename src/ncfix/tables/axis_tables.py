@@ -138,7 +138,10 @@ def additive(
         count = region.nodes_needed(axis, curve, outputs, most, target)
         unit = machine.axes[axis].unit
         nodes = np.round(region.fine(axis, count) / unit, 4) * unit
-        half = region.half_reversal(axis) if both else np.zeros(FINE)
+        half = np.zeros(FINE)
+        if both:  # of what its own correction differs by between both ways
+            ahead, back = (region.means(axis, np.eye(len(space))[axis] * way)[0][:, axis] for way in (1.0, -1.0))
+            half = (ahead - back) / 2
         tables.append(_axis_tables(region, axis, curve, outputs, nodes, half))
     for number, table in enumerate(tables):  # that of an axis over itself has the mean over all
         constant, values = total[number], table.values.copy()
@@ -173,12 +176,6 @@ class Region:
         curve[:, machine.rotary & (np.arange(len(space)) != axis)] = 0.0
         over_all: Array = (curve[1:] + curve[:-1]).mean(axis=0) / 2
         return curve, over_all
-
-    def half_reversal(self, axis: int) -> Array:
-        """Half of what the own correction of an axis differs by between both ways, at its fine positions, (FINE,)."""
-        ways = [np.eye(len(self.space))[axis] * way for way in (1.0, -1.0)]
-        ahead, back = (self.means(axis, way)[0][:, axis] for way in ways)
-        return (ahead - back) / 2
 
     def outputs(self, axis: int, curve: Array, target: float) -> NDArray[np.intp]:
         """The axes that tables over this one correct: itself, and those that need more than a tenth of the target."""

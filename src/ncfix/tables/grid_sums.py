@@ -143,7 +143,8 @@ def searched(volume: Volume, found: Sequence[Face], target: float, points: int) 
     exact = volume.exact(positions)
     best: Sum | None = None
     for _ in range(ROUNDS):
-        grids = tuple(_searched(part, share, points) for part, share in zip(parts, shares.tolist(), strict=True))
+        pairs = zip(parts, shares.tolist(), strict=True)
+        grids = tuple(search(part, share, [points] * len(part.inputs), points).grid for part, share in pairs)
         left = float(np.linalg.norm(exact - _total(volume, grids, positions), axis=1).max())
         made = Sum(tuple(found), grids, left, left <= target)
         if made.points > points:
@@ -157,10 +158,6 @@ def searched(volume: Volume, found: Sequence[Face], target: float, points: int) 
         sizes = np.array([grid.points for grid in grids], dtype=np.float64) ** EVEN
         shares *= sizes / sizes.mean()
     return best or made
-
-
-def _searched(part: Volume, share: float, points: int) -> Grid:
-    return search(part, share, [points] * len(part.inputs), points).grid
 
 
 def _total(volume: Volume, grids: Sequence[Grid], positions: Array) -> Array:

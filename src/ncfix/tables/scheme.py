@@ -137,7 +137,10 @@ class PartSelection:
         Parts are taken away, cheapest first, and put together, most worth first; then the largest that are left out are
         tried in the better of the two, in place of others.
         """
-        self._leave_smallest(tables + MANY_MORE)
+        for key in sorted(self.chosen, key=lambda key: self.part(key).size):
+            if self.total <= tables + MANY_MORE:
+                break
+            self.chosen -= {key}  # it will not come back
         whole = self.chosen
         self._thin(tables)
         best = self.chosen, self.silent, self.lost
@@ -150,13 +153,6 @@ class PartSelection:
             self._thin(tables)
             best = min(best, (self.chosen, self.silent, self.lost), key=lambda found: found[2])
         self.chosen, self.silent, _ = best
-
-    def _leave_smallest(self, tables: int) -> None:
-        """Leave out the smallest parts until no more than `tables` are taken: they will not come back."""
-        for key in sorted(self.chosen, key=lambda key: self.part(key).size):
-            if self.total <= tables:
-                return
-            self.chosen -= {key}
 
     def _thin(self, tables: int) -> None:
         """Leave out what costs least for the tables that it frees, until no more than `tables` are taken."""

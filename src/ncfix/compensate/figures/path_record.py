@@ -13,7 +13,7 @@ from dataclasses import field, replace
 
 import numpy as np
 
-from ncfix.compensate.account import Account, Reason
+from ncfix.compensate.account import Account
 from ncfix.compensate.plan.arrays import Array, Index, Mask, owners, picked, stacked, taken
 from ncfix.compensate.plan.deviation import errors_at, samples
 from ncfix.compensate.plan.figure_tally import PathSamples
@@ -166,7 +166,9 @@ class PathRecord:
                 for block in chosen
             ]
 
-        self.refused += listed(account.refused, lambda block: _said(account.refused[block]))
+        self.refused += listed(
+            account.refused, lambda block: f"{account.refused[block].code}: {account.refused[block].text}"
+        )
         self.passed += listed(account.passed, lambda block: account.passed[block] or account.rules[block])
         del self.refused[LISTED:], self.passed[LISTED:]
 
@@ -288,10 +290,6 @@ def _bent(written: WrittenPieces, which: Index) -> tuple[Index, Array]:
     )  # where a rapid has led a cut, and where all begins
     first = first[drawn[first] & np.isfinite(picked(segments.start, which[first])).all(axis=1)]
     return np.concatenate([which[first], inside[0]]), np.concatenate([np.zeros(len(first)), inside[1]])
-
-
-def _said(reason: Reason) -> str:
-    return f"{reason.code}: {reason.text}"
 
 
 def _spot(values: Mapping[str, Array], row: int) -> ListedPlace:

@@ -75,7 +75,7 @@ def _fitted(intent: Intent, standing: Segments, rows: Index, closure: Closure, r
     ends = arcs.start[:, intent.columns], arcs.end[:, intent.columns]
     programmed, wanted = _corrected_path(intent, standing, rows)
     mean = intent.moves.centre[rows] + (wanted - programmed).mean(axis=1).T
-    centre = _in_plane(arcs.centre, arcs.normal, mean)
+    centre = arcs.centre + across(mean - arcs.centre, arcs.normal)  # the height of a centre means nothing
     closed = full_circles(intent, rows) & (np.linalg.norm(across(ends[1] - ends[0], arcs.normal), axis=1) < CLOSED)
     centre = np.where(closed[:, None], centre, _onto_bisector(*ends, arcs.normal, centre))
     best = _best_on_bisector(arcs, ends, centre, wanted)
@@ -118,11 +118,6 @@ def _corrected_path(intent: Intent, real: Segments, rows: Index) -> tuple[Array,
 def across(vectors: Array, normal: Array) -> Array:
     """The part of vectors (k, 3) across the normals."""
     return vectors - np.einsum("ij,ij->i", vectors, normal)[:, None] * normal
-
-
-def _in_plane(origin: Array, normal: Array, points: Array) -> Array:
-    """Points moved along the normals to the height of `origin`: the height of a centre means nothing."""
-    return origin + across(points - origin, normal)
 
 
 def _onto_bisector(start: Array, end: Array, normal: Array, centre: Array) -> Array:
