@@ -68,7 +68,12 @@ class PartReader:
         blocks = self.language.split(source)
         if not begun:
             blocks[0, 0] = header_length(source)
-        end = self._end_later(source, blocks) if begun else self.language.end(source, blocks)
+        end = len(blocks)
+        if not begun:
+            end = self.language.end(source, blocks)
+        elif b"%" in source:  # told as behind a first block
+            before = b"X\n"
+            end = self.language.end(before + source, np.vstack(([[0, 1]], blocks + len(before)))) - 1
         reading = ProgramReading(
             source, self.path, self.dialect, self.language, blocks, end, self.templates, self.index
         )
@@ -79,13 +84,6 @@ class PartReader:
         if not all(map(self.language.straight, self.templates[before:])):
             raise NotInPartsError("the program does not run straight from its first line to its last")
         return program
-
-    def _end_later(self, source: bytes, blocks: NDArray[np.int64]) -> int:
-        """The block that ends the text, where this is not the first part."""
-        if b"%" not in source:
-            return len(blocks)
-        before = b"X\n"
-        return self.language.end(before + source, np.vstack(([[0, 1]], blocks + len(before)))) - 1
 
     def last_cut(self, program: Program) -> int:
         """The last block before which a part may end; 0 if there is none."""
@@ -275,7 +273,11 @@ class Follower:
         if not self.unchanged or control.unknown or control.builder.winding is not None or len(moves) < 2:
             return None
         straight = np.isin(moves.kind[-2:], (MotionKind.RAPID, MotionKind.FEED)) & np.isin(moves.modal[-2:], (0, 10))
-        if not straight.all() or moves.block[-2] + 1 != moves.block[-1] or _changes_tools(moves):
+        if not straight.all() or moves.block[-2] + 1 != moves.block[-1]:
+            return None
+        tool, length = moves.tool, moves.tool_length  # what is lacking is said of each tool, and of each length of it
+        same = (tool == tool[-1]) & ((length == length[-1]) | (np.isnan(length) & np.isnan(length[-1])))
+        if not same.all():
             return None
         before = moves.start[-1].tolist(), float(moves.feed[-2]), modal.feed_given, int(moves.modal[-2])
         return Checkpoint(*before, control.set_variables())
@@ -309,13 +311,6 @@ class Follower:
     def assumed(self) -> tuple[str, ...]:
         """What was taken as zero so far, in words."""
         return tuple(self.control.knowledge.assumed)
-
-
-def _changes_tools(moves: Moves) -> bool:
-    """Whether motions are made with more than one tool, or length of it: what is lacking is said of each of them."""
-    tool, length = moves.tool, moves.tool_length
-    same = (length == length[-1]) | (np.isnan(length) & np.isnan(length[-1]))
-    return bool((tool != tool[-1]).any() or not same.all())
 
 
 FAR = 1e9

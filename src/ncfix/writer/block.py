@@ -74,8 +74,10 @@ class BlockWriter(BlockText):
         for piece in range(1, len(self.target.ends)):
             position = self._further_piece(position, piece)
             self.out.ends.append(position)
-        if self.dragged:
-            self._feed_as_before()
+        if self.dragged:  # back to the feed that was in force, for what follows; in inverse time each has its own
+            words = [] if self.target.turn_by_feed else [self._code(PER_MINUTE)]
+            words.append(self._cased("F") + self._feed_in_force())
+            self._line([self._code(INVERSE_TIME)] if self.target.back_to_inverse_time else words)
         self._move_late_words()
 
     # -- the block itself ---------------------------------------------------------------------------------------------
@@ -489,9 +491,3 @@ class BlockWriter(BlockText):
         if feed is not None and isinstance(feed.value, Literal):
             return self.program.slice(self.block, feed.value_span)
         return f"{self.target.feed:.6f}".rstrip("0")
-
-    def _feed_as_before(self) -> None:
-        """Back to the feed that was in force, for the blocks that follow; in inverse time each has its own."""
-        words = [] if self.target.turn_by_feed else [self._code(PER_MINUTE)]
-        words.append(self._cased("F") + self._feed_in_force())
-        self._line([self._code(INVERSE_TIME)] if self.target.back_to_inverse_time else words)

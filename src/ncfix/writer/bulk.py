@@ -183,7 +183,7 @@ class Bulk:
         self.added -= int(np.diff(self.first_piece)[rows].sum()) - len(rows)
 
     def _steps_for(self, decimals: IntArray) -> OutputSteps:
-        return OutputSteps(self.text, decimals, _halves(decimals), self.layouts.spelling.signed)
+        return OutputSteps(self.text, decimals, 0.5 * 10.0 ** -decimals.astype(float), self.layouts.spelling.signed)
 
     def _written(
         self, row: int, position: FloatArray, frame: FrameMap, steps: OutputSteps
@@ -238,11 +238,6 @@ def _stops(fit: Mask) -> IntArray:
     """(n + 1,) for each motion, and behind the last one, the first from there on that is not `fit` (n,)."""
     ends = np.append(np.flatnonzero(~fit), len(fit))
     return np.repeat(ends, np.diff(ends, prepend=-1))
-
-
-def _halves(decimals: IntArray) -> FloatArray:
-    """Half output steps."""
-    return 0.5 * 10.0 ** -decimals.astype(float)
 
 
 def _is_plain(frame: Frame) -> bool:
