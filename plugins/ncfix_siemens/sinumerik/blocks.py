@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from functools import reduce
 
 from lark import Token, UnexpectedInput
-from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
 from ncfix.text.build import (
     MAX_DEPTH,
@@ -28,7 +27,7 @@ from ncfix.text.build import (
     tokens_of,
 )
 from ncfix.text.dialect import Dialect
-from ncfix.text.faults import BlockError
+from ncfix.text.faults import BlockError, position_of
 from ncfix.text.grammar import UnspacedBlock, parse
 from ncfix.text.tree import (
     END,
@@ -251,8 +250,6 @@ class SinumerikBuilder(TreeBuilder):
         parts = tree.children
         first = parts[0]
         match kind(tree):
-            case "literal":
-                return self.expression(first, depth)
             case "bracket":
                 return Unary(BRACKET, self.expression(first, depth))
             case "text":
@@ -271,12 +268,7 @@ class SinumerikBuilder(TreeBuilder):
                 return FunctionCall(str(first).lower(), self.arguments(parts[1], depth))
             case "list":
                 return FunctionCall(BRACKET, self.arguments(tree, depth))
-            case "unary":
-                return Unary(str(first).lower(), self.expression(parts[1], depth))
-            case "binary":
-                left, operator, right = parts
-                return self.binary(left, operator, right, depth)
-        raise AssertionError(f"the grammar has an expression {tree.data!r} that nobody builds")
+        return TreeBuilder.compound(self, tree, depth)
 
 
 def is_word(name: str) -> bool:
@@ -341,10 +333,7 @@ def check_repeats(parsed: Parsed) -> None:
 
 def explained(error: UnexpectedInput, text: str) -> BlockError:
     """The parser's complaint in words."""
-    place = len(text)
-    missing = isinstance(error, UnexpectedToken) and error.token.type == "$END"
-    if isinstance(error, UnexpectedCharacters | UnexpectedToken) and error.pos_in_stream is not None and not missing:
-        place = int(error.pos_in_stream)
+    place = position_of(error, text)
     before, at = text[:place].rstrip(), text[place : place + 1]
     if before.endswith("="):
         return BlockError("NCF114", "there is no value after =", place)

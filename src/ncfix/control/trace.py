@@ -71,9 +71,9 @@ class PartReader:
         end = len(blocks)
         if not begun:
             end = self.language.end(source, blocks)
-        elif b"%" in source:  # told as behind a first block
-            before = b"X\n"
-            end = self.language.end(before + source, np.vstack(([[0, 1]], blocks + len(before)))) - 1
+        elif b"%" in source:
+            head = b"X\n"  # as behind a first block
+            end = self.language.end(head + source, np.vstack(([[0, 1]], blocks + len(head)))) - 1
         reading = ProgramReading(
             source, self.path, self.dialect, self.language, blocks, end, self.templates, self.index
         )

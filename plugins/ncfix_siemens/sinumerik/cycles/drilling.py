@@ -16,7 +16,16 @@ from collections.abc import Sequence
 from ncfix.control.coordinates import LETTERS, mask_of, rotated
 from ncfix.control.expressions import number
 from ncfix.control.moves import CycleCall, MotionEnd, MotionKind, Pass, Passing
-from ncfix_siemens.sinumerik.cycles.milling import MILLING, OTHER_PLANE, PLANES, digit, milling_of, said_in
+from ncfix_siemens.sinumerik.cycles.milling import (
+    ALIKE,
+    MILLING,
+    OTHER_PLANE,
+    PLANES,
+    TWO_DEPTHS,
+    digit,
+    milling_of,
+    said_in,
+)
 from ncfix_siemens.sinumerik.framing import mind_carried, take_up
 from ncfix_siemens.sinumerik.plans import Calling
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
@@ -129,7 +138,6 @@ POCKETS = frozenset({"cycle63", "cycle64"})
 MADE = "motions that the control makes up ({})"
 MADE_HOLES = "holes whose places the control makes up ({})"
 HEIGHTS = "the heights of the cycle {} are known only at run time"
-TWO_DEPTHS = "the depth of the cycle {} is given twice, DP and DPR, and they are not the same"
 BY_DIAMETER = "the depth of {} follows from a diameter (_GMODE)"
 TO_A_HOLE = "a hole under MCALL to which neither G0 nor G1 leads, or one in machine coordinates"
 WITH_WORDS = "a drilling cycle and axis words in one block"
@@ -148,9 +156,6 @@ PLANE_AT = {"cycle81": 7, "cycle82": 7, "cycle83": 18, "cycle85": 9, "cycle86": 
 AXIS_AT = {"cycle83": 12, "cycle84": 12, "cycle840": 11}
 """Which is AXN: 1 and 2 make it drill along an axis of the plane."""
 OTHER_AXIS = "{} drills along an axis of the plane in force (AXN)"
-
-ALIKE = 1e-6
-"""Program units; two depths that differ by less are one."""
 
 
 def drilling_of(control: Sinumerik, step: Calling) -> Drilling:
