@@ -100,14 +100,11 @@ def started(*more: str) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
 
 
-def test_results_come_in_order(cluster: Cluster) -> None:
-    found = results_in_order(abs, [-3, 2, -1], executor_of(cluster.address), 2, lambda task: task)
-    assert list(found) == [3, 2, 1]
-
-
-def test_what_the_work_raises_is_raised(cluster: Cluster) -> None:
+def test_results_come_in_order_and_what_the_work_raises_is_raised(cluster: Cluster) -> None:
+    executor = executor_of(cluster.address)
+    assert list(results_in_order(abs, [-3, 2, -1], executor, 2, lambda task: task)) == [3, 2, 1]
     with pytest.raises(ValueError, match="x"):
-        list(results_in_order(int, ["1", "x"], executor_of(cluster.address), 2, lambda task: -1))
+        list(results_in_order(int, ["1", "x"], executor, 2, lambda task: -1))
 
 
 def test_workers_are_killed_and_then_the_scheduler(ncfix: Any, parts: Path, cluster: Cluster) -> None:

@@ -250,7 +250,7 @@ def seeds(reader: str) -> tuple[bytes, ...]:
         rng = random.Random(reader)
         turns = {"linuxcnc": "", "iso": "turned"}.get(language, "tilted" if kind == "table" else "turned")
         plain = []
-        for k, length in enumerate((8, 8, 3, 3)):
+        for k, length in enumerate((5, 5, 3, 3)):
             five, frame = kind == "table" and k == 3, turns if k < 2 else ""
             plain.append(Writer(language, rng, bool(k % 2), five, {}, [], frame).program(length))
         lines = EXTRAS[language]
