@@ -145,11 +145,6 @@ def letters_of(template: Template) -> frozenset[str]:
     return frozenset(item.address for item in template.items if isinstance(item, Word))
 
 
-def has_corners(program: Program) -> bool:
-    """Whether the control puts in corners anywhere in a program."""
-    return any(CORNER & letters_of(template) for template in program.templates)
-
-
 def axes_of_corner(program: Program, block: int) -> frozenset[str] | None:
     """The axes that a block at a corner may name, None for other blocks."""
     own = letters_of(program.template_of(block))

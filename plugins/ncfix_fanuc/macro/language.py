@@ -16,7 +16,7 @@ from ncfix.text.shapes import scan
 from ncfix.text.spelling import Spelling
 from ncfix.text.tree import Literal, OWordLine, Program, Template
 from ncfix.writer.pieces import Pieces
-from ncfix_fanuc.macro.blocks import CORNER, axes_of_corner, has_corners, letters_of, parse_block
+from ncfix_fanuc.macro.blocks import CORNER, axes_of_corner, letters_of, parse_block
 from ncfix_fanuc.macro.control import MacroControl
 from ncfix_fanuc.macro.interpreter import MacroInterpreter
 from ncfix_fanuc.macro.rules import RULES
@@ -50,7 +50,8 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     if any(isinstance(word.value, Literal) and word.value.pointless for word in words if word.address not in "NFS"):
         return None
     assert RS274.bulk is not None
-    found = None if has_corners(program) else RS274.bulk(program, block)
+    corners = any(CORNER & letters_of(template) for template in program.templates)
+    found = None if corners else RS274.bulk(program, block)
     stops = not STOPS.isdisjoint(program.template_of(block).m_codes)
     return replace(found, further=False) if found is not None and stops else found
 

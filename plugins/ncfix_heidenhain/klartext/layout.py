@@ -182,12 +182,8 @@ def _in_path(shape: Shape) -> tuple[bool, bool]:
     """Whether blocks of a shape stand between elements of the path, and whether they are corners."""
     items = shape.template.items
     names = (item.name if isinstance(item, Command) else getattr(item, "address", "") for item in items)
-    return is_between(items), any(name.lower() in CORNERS for name in names)
-
-
-def is_between(items: Sequence[Item]) -> bool:
-    """Remarks only, or a pole (CC): elements before and after it follow each other."""
-    return all(map(is_remark, items)) or any(isinstance(item, Command) and item.name == "cc" for item in items)
+    pole = any(isinstance(item, Command) and item.name == "cc" for item in items)
+    return pole or all(map(is_remark, items)), any(name.lower() in CORNERS for name in names)
 
 
 def is_remark(item: Item) -> bool:

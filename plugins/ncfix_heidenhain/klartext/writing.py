@@ -239,7 +239,9 @@ class KlartextWriter(BlockWriter):
 
     def _piece_of_arc(self, begin: FloatArray, piece: int, centre: FloatArray) -> PieceOfArc:
         target = self.target
-        turn = self._angle_of_helix()
+        word = next((word for word in self.layout.polar if word.address == "IPA"), None)
+        angle = math.nan if word is None or self.layout.name != "cp" else self._value(word, math.nan)
+        turn = math.radians(angle) if math.isfinite(angle) else None
         return PieceOfArc(
             begin=begin,
             end=self._as_written(begin, target.ends[piece], own=piece == 0),
@@ -250,12 +252,6 @@ class KlartextWriter(BlockWriter):
             turn=None if turn is None else turn * float(target.shares[piece]),
             decimals=target.decimals,
         )
-
-    def _angle_of_helix(self) -> float | None:
-        """The angle of a CP in rad, if it is given by IPA."""
-        word = next((word for word in self.layout.polar if word.address == "IPA"), None)
-        angle = math.nan if word is None or self.layout.name != "cp" else self._value(word, math.nan)
-        return math.radians(angle) if math.isfinite(angle) else None
 
     def _as_written(self, begin: FloatArray, end: FloatArray, *, own: bool) -> FloatArray:
         """An end on the digits that will be written; `own`: by the words of the block itself."""
@@ -310,7 +306,9 @@ class KlartextWriter(BlockWriter):
         across, position = target.spatial[2], target.start.copy()
         rotary = [column for column, _ in self.columns if called and self._is_rotary(column)]
         self._axis_words(position, target.ends[0], skipped=(across, *rotary))
-        position[across] = self._bottom(across)
+        lower = float(target.nominal[across])
+        off = float(target.ends[0][across]) - lower
+        position[across] = lower + (self._sunk if target.code == BY_DEPTH else self._lifted)(off, across)
         if self.layout.polar:
             self._motion_code()
         if called and self.added:
@@ -318,12 +316,6 @@ class KlartextWriter(BlockWriter):
             self._function(" ".join(["L", *words, self.layout.closing or "FMAX", "M99"]))
             self.added.clear()
         self.out.ends.append(position)
-
-    def _bottom(self, across: int) -> float:
-        """Where the hole ends, as it is written."""
-        lower = float(self.target.nominal[across])
-        off = float(self.target.ends[0][across]) - lower
-        return lower + (self._sunk if self.target.code == BY_DEPTH else self._lifted)(off, across)
 
     def _sunk(self, off: float, across: int) -> float:
         """Move the surface from which the cycle counts its depth, for this hole only; by how much.

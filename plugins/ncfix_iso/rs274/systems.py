@@ -309,8 +309,10 @@ def shift_system(control: RS274Control, block: Block, code: int) -> None:
         moved_while_turned(control, f"G{code // 10}")
         if control.modal.incremental and code == BY_POSITION:
             control.refuse_rest(COUNTED_ON)
-        elif code == LOCAL and is_on_top(control, block):
-            control.refuse_rest(ON_TOP)
+        elif code == LOCAL and control.modal.incremental:
+            local = control.frames.local
+            if any(local.shift[i] or i in local.unknown for i in words_of(block)):
+                control.refuse_rest(ON_TOP)
         set_local(control, block, cancelled=code == BY_POSITION)
         if code == LOCAL:
             return
@@ -359,12 +361,6 @@ def preset_system(control: RS274Control, block: Block, code: int) -> None:
     )
     compose(control)
     control.places.shift(mask_of(named))
-
-
-def is_on_top(control: RS274Control, block: Block) -> bool:
-    """Whether G52 stands in G91 where a shift is in force along an axis that it names."""
-    local = control.frames.local
-    return control.modal.incremental and any(local.shift[i] or i in local.unknown for i in words_of(block))
 
 
 def set_local(control: RS274Control, block: Block, *, cancelled: bool) -> None:

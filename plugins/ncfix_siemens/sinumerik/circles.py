@@ -26,7 +26,9 @@ def tangential(control: Sinumerik, words: BlockWordValues) -> None:
     """CT with its end; TURN adds full turns. One that is refused keeps what it begins from, and so its direction."""
     control.use_all_start_positions()
     end, heading, plane = destination(control, words), control.heading, control.modal.plane
-    why = tangent_refusal(words)
+    why = TURNS_AT_RUNTIME if words.unknown("TURN") else ""
+    if {"AP", "RP"} & words.values.keys():
+        why = POLAR_ARC
     step = control.way_to(end.target)
     ahead = (0.0, 0.0) if heading is None else plane.of(heading)
     chord = plane.of(step)
@@ -46,13 +48,6 @@ def tangential(control: Sinumerik, words: BlockWordValues) -> None:
     sweep += math.copysign(2 * math.pi * max(round(words.get("TURN")), 0), left)
     circle = circle_of(control, plane, (-ahead[1] * away, ahead[0] * away), sweep)
     control.go(MotionKind.ARC, words, end, CT_LEFT if left > 0 else CT_RIGHT, arc=circle)
-
-
-def tangent_refusal(words: BlockWordValues) -> str:
-    """Why it is refused, whatever its geometry."""
-    if {"AP", "RP"} & words.values.keys():
-        return POLAR_ARC
-    return TURNS_AT_RUNTIME if words.unknown("TURN") else ""
 
 
 CENTRE_AT_RUNTIME = "the centre of the arc is known only at run time"
@@ -144,7 +139,10 @@ def geometry(control: Sinumerik, words: BlockWordValues, end: MotionEnd, *, cloc
     letters = plane.of(CENTRE_LETTERS)
     has_centre = any(letter in words.values for letter in letters)
     if {"AP", "RP"} & words.values.keys():
-        centre = centre_at_pole(control, plane)
+        if control.modes.pole is None:
+            raise Fault(ARC_FAULT, NO_POLE)
+        here = control.program_position()
+        centre = control.modes.pole[0] - here[plane.first], control.modes.pole[1] - here[plane.second]
         check_closure(centre, chord, control.dialect.closure_mm, control.dialect.closure_relative)
         return centre, end
     if "CR" in words.values:
@@ -158,14 +156,6 @@ def geometry(control: Sinumerik, words: BlockWordValues, end: MotionEnd, *, cloc
         return centre, ended_by_angle(control, words, end, centre, clockwise=clockwise)
     check_closure(centre, chord, control.dialect.closure_mm, control.dialect.closure_relative)
     return centre, end
-
-
-def centre_at_pole(control: Sinumerik, plane: Plane) -> Point:
-    """The centre of an arc in polar coordinates, the pole, relative to the start, mm."""
-    if control.modes.pole is None:
-        raise Fault(ARC_FAULT, NO_POLE)
-    here = control.program_position()
-    return control.modes.pole[0] - here[plane.first], control.modes.pole[1] - here[plane.second]
 
 
 def centre_words(control: Sinumerik, words: BlockWordValues, plane: Plane) -> Point:

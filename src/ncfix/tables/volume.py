@@ -350,16 +350,12 @@ def _frontier(axes: Sequence[tuple[Counts, Array]], points: int) -> tuple[Counts
         grown = np.concatenate([np.repeat(counts, len(line), axis=0), np.tile(line, len(counts))[:, None]], axis=1)
         total = (missed[:, None] + part).reshape(-1)
         allowed = grown.prod(axis=1) * rest <= points
-        counts, missed = _undominated(grown[allowed], total[allowed])
+        counts, missed = grown[allowed], total[allowed]
+        order = np.lexsort((missed, counts.prod(axis=1)))
+        before = np.minimum.accumulate(np.concatenate([[np.inf], missed[order][:-1]]))
+        better = order[missed[order] < before]
+        counts, missed = counts[better], missed[better]
     return counts, missed
-
-
-def _undominated(counts: Counts, missed: Array) -> tuple[Counts, Array]:
-    order = np.lexsort((missed, counts.prod(axis=1)))
-    sorted_missed = missed[order]
-    before = np.minimum.accumulate(np.concatenate([[np.inf], sorted_missed[:-1]]))
-    better = order[sorted_missed < before]
-    return counts[better], missed[better]
 
 
 def _at(volume: Volume, counts: Counts, target: float) -> Mesh:
