@@ -12,7 +12,8 @@ from conftest import missing, require_module
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 SOFTWARE = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-"""No graphics card is needed, and root may run it."""
+SOFTWARE += ("--disable-gpu-rasterization", "--disable-gpu-compositing")
+"""No graphics card is needed, and root may run it; only WebGL is drawn by a card in software, which takes longer."""
 
 
 @pytest.fixture(scope="session")
