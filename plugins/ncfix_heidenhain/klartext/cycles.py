@@ -49,9 +49,10 @@ IN_SPACE = frozenset({*range(20, 26), 204, *range(210, 216), 225, *range(230, 23
 """Cycles with a path of their own that move X, Y and Z only; others, on the shell of a cylinder, turn axes, too."""
 
 OLD = frozenset({1, 2, 17, 18}) | OLD_MILLING
-"""Cycles that count how deep they go from where they are called."""
-GAP_WORDS = frozenset({"SETUP", "AVST", "ABST", "DIST"})
-DEPTH_WORDS = frozenset({"DEPTH", "TIEFE"})
+"""Cycles that count how deep they go from where they are called; the names of what they say are in any language."""
+GAP_PART, DEPTH_PART, THREAD_CUTTING = "1", "2", 18
+"""Parts of an old cycle, `1.2`; thread cutting has its depth first, and no clearance."""
+LAST = re.compile(rf"{VALUE}\s*\Z", re.IGNORECASE)
 ADJUSTING = frozenset({291, 800, 801, 880, *range(1000, 1100)})
 ADJUSTED = "cycle {} may change coordinates, for turning or grinding, in a way that is not followed"
 BUILDERS = range(300, 400)
@@ -78,8 +79,8 @@ FROM_INCREMENT = "an old cycle is called from a height in increments (IZ)"
 
 def define(control: KlartextControl, name: str, words: MotionWords, text: str) -> None:
     """A CYCL DEF block: `name` is `200`, or `7.1`."""
-    number, _, part = name.partition(".")
-    cycle = int(number)
+    whole, _, part = name.partition(".")
+    cycle = int(whole)
     if cycle in transformations.ACTS:
         transformations.transform(control, cycle, part, words, text)
         return
@@ -103,6 +104,9 @@ def define(control: KlartextControl, name: str, words: MotionWords, text: str) -
     words_of_step = {**words.values}
     if words.unknown:
         words_of_step["?"] = 1.0
+    if cycle in OLD and not words_of_step and (last := LAST.search(LEFT_OUT.sub(" ", text))):
+        value = numbers([number(last[0], control.scope.parameters)])
+        words_of_step["" if value else "?"] = value[0] if value else 1.0
     control.cycle.steps |= {f"{part}:{key}": value for key, value in words_of_step.items()}
 
 
@@ -194,8 +198,9 @@ def levels(control: KlartextControl, height: float) -> tuple[float, float, str]:
     """Bottom and clearance of the cycle in force along the tool axis of the frame, mm; and why they are not known."""
     cycle, unit = control.cycle, control.stretch
     if cycle.number in OLD:
-        depth, gap = value_of_any(cycle.steps, DEPTH_WORDS), value_of_any(cycle.steps, GAP_WORDS)
-        if depth is None or gap is None or any(key.endswith(":?") for key in cycle.steps):
+        depth, gap = value_of_part(cycle.steps, DEPTH_PART), value_of_part(cycle.steps, GAP_PART)
+        unsure = cycle.number == THREAD_CUTTING or any(key.endswith(":?") for key in cycle.steps)
+        if depth is None or gap is None or unsure:
             return height, height, DEPTH_AT_RUN_TIME
         if depth == 0.0:
             return height, height, NOT_EXECUTED
@@ -213,9 +218,10 @@ def levels(control: KlartextControl, height: float) -> tuple[float, float, str]:
     return unit * (surface + depth), unit * clear, ""
 
 
-def value_of_any(steps: Mapping[str, float], names: frozenset[str]) -> float | None:
-    """What an old cycle says under one of several names."""
-    return next((value for key, value in steps.items() if "".join(key.partition(":")[2].split()) in names), None)
+def value_of_part(steps: Mapping[str, float], part: str) -> float | None:
+    """What an old cycle says in one of its parts; None of a part with no value, or several."""
+    values = [value for key, value in steps.items() if key.partition(":")[0] == part]
+    return values[0] if len(values) == 1 else None
 
 
 def own_path(control: KlartextControl, step: Step) -> None:

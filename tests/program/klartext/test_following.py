@@ -289,6 +289,18 @@ def test_holes() -> None:
     assert moves.end[5].tolist() == [30, 20, 11]
 
 
+@pytest.mark.parametrize("number", [1, 2, 17])
+@pytest.mark.parametrize(
+    ("gap", "depth"), [("ABST 2", "TIEFE -10"), ("ODSTEP 2", "GLEBOKOSC-10"), ("DIST. -2", "PROF. -10,0"), ("2", "-Q1")]
+)
+def test_old_cycles_in_the_words_of_any_language(number: int, gap: str, depth: str) -> None:
+    body = (
+        f"Q1 = 10\nCYCL DEF {number}.0 P\nCYCL DEF {number}.1 {gap}\nCYCL DEF {number}.2 {depth}\nL Z+5 FMAX\nL X+1 M99"
+    )
+    assert ends(body)[-1] == [1, 0, -7]
+    assert "run time" in reasons(body.replace(depth, "TIEFE"))[0]
+
+
 def test_holes_of_old_cycles_count_from_where_they_begin() -> None:
     body = "CYCL DEF 1.0 P\nCYCL DEF 1.1 SETUP 2\nCYCL DEF 1.2 DEPTH -10\nL Z+5 FMAX\nL X+1 M99\nL X+2 M99"
     assert ends(body)[1:] == [[1, 0, -7], [2, 0, -7]]
