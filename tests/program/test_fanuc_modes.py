@@ -93,6 +93,14 @@ def test_what_differs_from_control_to_control_is_refused(text: str, reason: str)
     assert reason in reasons(follow(text, setup=SETUP, dialect="fanuc"))[-1]
 
 
+@pytest.mark.parametrize("begin", ["G68X0Y0R#139", "G68X#139Y0R30.", "G68X1.Y1.", "G68.2X0Y0Z0I0J#139K0"])
+def test_coordinates_that_are_not_certain_end_with_g69(begin: str) -> None:
+    """A rotation in the plane leaves rotary axes where they are known to stand."""
+    end = "X3.Y3.Z3." if begin.startswith("G68X") else "X3.Y3.Z3.B0C0"
+    found = follow(f"G0X1.Y1.Z1.B0C0\n{begin}\nX2.Y2.\nG69\n{end}\nX4.", "CBXYZ", setup=SETUP, dialect="fanuc")
+    assert [bool(reason) for reason in reasons(found)] == [False, True, False, False]
+
+
 @pytest.mark.parametrize("mirror", ["", "X0", "Y0", "Z0", "X0Y0"])
 def test_mirrored_arcs_turn_the_other_way(mirror: str) -> None:
     text = f"G51.1{mirror}\n" if mirror else ""

@@ -47,7 +47,7 @@ from ncfix.control.tcp import switch
 from ncfix_fanuc.macro.control import COMPONENTS, MacroControl
 from ncfix_iso.rs274.control import Block
 from ncfix_iso.rs274.parameters import whole
-from ncfix_iso.rs274.systems import rotate_system, turned_back, unfollowed
+from ncfix_iso.rs274.systems import ENDS, rotate_system, turned_back, unfollowed
 
 STRAIGHT, ARCS = (0, 10), (20, 30)
 BAD_VECTOR = "NCF219"
@@ -146,7 +146,8 @@ def tilt(control: MacroControl, block: Block, code: int) -> None:
         unfollowed(control, block, code)
         return
     if block.unknown:
-        control.refuse_rest("the tilted plane (G68.2) is known only at run time")
+        control.suspend(ENDS[CANCEL], "the tilted plane (G68.2) is known only at run time")
+        return
     if form in LAST:
         define(control, block, form)
         return

@@ -30,6 +30,7 @@ from ncfix.control.coordinates import (
 from ncfix.control.expressions import Fault, Unknown, nominal
 from ncfix.control.frames import WORLD, Affine, turned_about
 from ncfix.control.moves import UnknownAxes
+from ncfix.control.state import XYZ
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.parameters import whole
 
@@ -74,6 +75,8 @@ ENDS = {
 }
 """The codes that end them."""
 
+ROTATED = "rotation"
+"""What a rotation in the plane that is not certain suspends, until G69."""
 AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
 
 
@@ -394,13 +397,15 @@ def rotate_system(control: RS274Control, block: Block, code: int) -> None:
     """G68 X Y R turns the coordinates of the plane about a point, G69 ends it."""
     before = control.frames.rotation.rotation
     if code == 680 and (why := uncertain(control, block)):
-        control.suspend(ENDS[690], why)
+        control.suspend(ROTATED, why)
         return
     control.frames = replace(control.frames, rotation=WORLD)
     if code == 680:
         turn_about_point(control, block, before if control.modal.incremental else IDENTITY)
     else:
         unfollowed(control, block, code)
+        if control.resume(ROTATED):
+            control.lose(XYZ, AFTER_UNFOLLOWED)
     if control.frames.rotation.rotation != before:
         control.unnamed = frozenset(control.modal.plane.pair)
     turned_back(control)
@@ -416,6 +421,10 @@ def uncertain(control: RS274Control, block: Block) -> str:
     again = control.frames.rotation.rotation != IDENTITY and not control.rules.adds_rotations
     if control.modal.incremental and (centred or again):
         return "what the words of a rotation (G68) count from in G91 differs from control to control"
+    pair = control.modal.plane.pair
+    control.use_start_positions([index for index in pair if LETTERS[index] not in block.values])
+    if block.unknown or control.unknown.keys() & {*pair}:
+        return "the centre or angle of a rotation (G68) is known only at run time"
     return ""
 
 
@@ -428,10 +437,6 @@ def turn_about_point(control: RS274Control, block: Block, before: Rotation) -> N
         if letter in block.values:
             step = centre[index] if control.modal.incremental else 0.0
             centre[index] = control.scale[index] * block.values[letter] + step
-        else:
-            control.use_start_positions((index,))
-    if block.unknown or control.unknown.keys() & set(plane.pair):
-        control.refuse_rest("the centre or angle of a rotation (G68) is known only at run time")
     turned = turned_about(product(before, about(plane, block.get("R"))), centre)
     control.frames = replace(control.frames, rotation=turned)
 
