@@ -125,7 +125,7 @@ FRAMES = [
     case("polar lines without a pole", "LP PR+10 PA+30 F100", L4=N),
     case("M128", "L M128\nL X+5 Y+6 Z+7 F100\nL M129", L5=R),
     case("tool centre point with spatial angles", "FUNCTION TCPM F TCP AXIS SPAT PATHCTRL AXIS\nL X+5 F100", L5=N),
-    case("M114", "M114\nL X+5 F100\nM115\nL X+6", L5=N, L7=R),
+    case("M114", "M114\nL X+5 F100\nM115\nL X+6", L5=N, L7=N),
 ]
 FLOW = [
     case("a branch that is decided", "Q1 = 1\nFN 9: IF +Q1 EQU +1 GOTO LBL 1\nL X+99\nLBL 1\nL X+5 F100", L8=R),

@@ -58,7 +58,7 @@ def switch_scaling(control: MacroControl, block: Block, code: int) -> None:
         if LETTERS[index] in block.values:
             centre[index] = control.scale[index] * block.values[LETTERS[index]]
     control.scaling, control.left_out = Scaling(centre, block.values["P"]), True
-    control.suspend("scaling", REASON)
+    control.suspend("scaling", REASON, followed=True)
     control.warn(AXES_SAID, ALIKE, "check which axes the control scales (Fanuc: parameter 5401 SCL)")
 
 
@@ -157,7 +157,7 @@ POLAR_ON = 160
 def switch_polar(control: MacroControl, block: Block, code: int) -> None:
     """G16 and G15."""
     if code == POLAR_ON and control.polar is None:
-        control.suspend("polar", POLAR_REASON)
+        control.suspend("polar", POLAR_REASON, followed=True)
         control.polar = math.nan, math.nan
     elif code != POLAR_ON:
         control.resume("polar")
@@ -176,7 +176,7 @@ def cartesian(control: MacroControl, block: Block) -> Block:
         return further_round(control, block, letters)
     radius, angle = (block.get(letter, known) for letter, known in zip(letters, control.polar, strict=True))
     control.polar = radius, angle
-    control.suspend("polar", ONE_ALONE if lone else POLAR_REASON)
+    control.suspend("polar", ONE_ALONE if lone else POLAR_REASON, followed=not lone)
     if lone:
         control.unwritten = control.unwritten or ONE_ALONE
         radius, angle = block.get(letters[0]), block.get(letters[1])

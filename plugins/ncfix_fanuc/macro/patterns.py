@@ -92,7 +92,7 @@ def pattern(control: RS274Control, block: Block, code: int) -> None:
         return
     program = control.program_position()
     middle = [block.get(letter, program[index] / modal.unit) for index, letter in enumerate("XY")]
-    control.suspend(PATTERN, FLATTEN.format(made.name))
+    control.suspend(PATTERN, FLATTEN.format(made.name), followed=True)
     for x, y in made.places(block.values, round(count)):
         hole = Block(block.index, {"X": middle[0] + x, "Y": middle[1] + y}, frozenset(), 0b11)
         cycle(control, hole, modal.motion)

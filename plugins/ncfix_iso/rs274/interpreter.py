@@ -332,7 +332,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         """Motions with @ or ^ are followed; written they can be in X and Y only."""
         polar = bool(block.values.keys() & POLAR)
         if polar:
-            self.control.suspend(POLAR_WORDS, POLAR_WORDS)
+            self.control.suspend(POLAR_WORDS, POLAR_WORDS, followed=True)
         yield
         if polar:
             self.control.resume(POLAR_WORDS)

@@ -64,6 +64,7 @@ NOT_ACCOUNTED = "nothing is known that the control would make of the word {} in 
 AFTER_THAT = "where the axis {{}} stands is not known after this: {}"
 FOLLOWED_IN_VAIN = 5000
 """Blocks that are followed for what else is not given, once the program has moved an axis that the machine lacks."""
+ASTRAY = "where the axis {} stands after motions that were not followed is not known"
 NO_UNIT = "NCF215"
 NO_UNIT_SAID = "the program does not say whether it is in inches or millimetres, and is taken as millimetres"
 NO_WAY = 1e-9
@@ -80,6 +81,8 @@ class ProgramControl(ControlState):
     needs_feed a motion at feed is an error where no feed is set
     refusal    why every motion from here on is refused; empty while all is well
     suspended  the same, for as long as a code is in force: what suspends them -> why
+    followed   those of `suspended` under which it is known all the same where motions lead
+    astray     the axes that motions have led elsewhere than is known while they were suspended, as bits
     foreign    the axes that the program moves and the machine lacks
     external   the subprogram file that is executed; empty in the program itself
     row_block  the block of the program to which motions belong: in a subprogram file the one that has called
@@ -102,6 +105,8 @@ class ProgramControl(ControlState):
         self.unit_said = self.needs_feed = False
         self.refusal = ""
         self.suspended: dict[str, str] = {}
+        self.followed: set[str] = set()
+        self.astray = 0
         self.foreign: dict[str, Message] = {}
         self.followed_in_vain = 0
         self.external = ""
@@ -175,13 +180,18 @@ class ProgramControl(ControlState):
         """Say of a cycle with a path of its own that only its place and bottom are corrected."""
         self.warn(MOVED_AS_A_WHOLE, AS_A_WHOLE.format(cycle))
 
-    def suspend(self, mode: str, why: str) -> None:
-        """Motions are refused until `resume` of the same mode."""
+    def suspend(self, mode: str, why: str, *, followed: bool = False) -> None:
+        """Motions are refused until `resume` of the same mode; `followed`: where they lead is known all the same."""
         self.suspended[mode] = why
+        (self.followed.add if followed else self.followed.discard)(mode)
 
     def resume(self, mode: str) -> bool:
-        """A mode that suspended motions is over; whether it was in force."""
-        return self.suspended.pop(mode, None) is not None
+        """A mode that suspended motions is over; whether it was in force. Where it has led axes is not known."""
+        over = self.suspended.pop(mode, None) is not None
+        if over and self.astray:
+            self.lose([index for index in self.machine if self.astray >> index & 1], ASTRAY)
+            self.astray = self.astray if self.suspended.keys() - self.followed else 0
+        return over
 
     @property
     def remarks(self) -> tuple[Message, ...]:
@@ -274,6 +284,8 @@ class ProgramControl(ControlState):
             start, end = begin, fate.end.in_machine
             style = self.builder.style(self.builder.styles[style]._replace(tcp=False, tcp_length=math.nan))
         self.builder.add(self.row_block, fate.axes, style, self.modal.feed, start, end, unplaced)
+        if self.suspended.keys() - self.followed:
+            self.astray |= self._moved_by(motion)
         if self.ends is not None:
             self.ends.append(fate.end.target[:])
         self.position, self.unknown = fate.end.target, fate.end.unknown
@@ -290,6 +302,11 @@ class ProgramControl(ControlState):
                 else:
                     del unknown[index]
 
+    def _moved_by(self, motion: Motion) -> int:
+        """The axes that a motion names or moves, as bits."""
+        target, here = motion.end.target, self.position
+        return mask_of(i for i in self.machine if motion.axes >> i & 1 or target[i] != here[i])
+
     def placed_by(self, motion: Motion) -> int:
         """The axes whose words say where they stand behind the motion."""
         if motion.placed is not None:
@@ -299,8 +316,7 @@ class ProgramControl(ControlState):
     def _keep_places(self, motion: Motion, placed: int) -> None:
         """What the program has said of where the axes stand; a motion that is passed may lead elsewhere."""
         if motion.passing and motion.kind != MotionKind.DWELL:
-            target, here = motion.end.target, self.position
-            self.places.lose(mask_of(i for i in self.machine if motion.axes >> i & 1 or target[i] != here[i]))
+            self.places.lose(self._moved_by(motion))
         lost = self._lost_at_end(motion)
         if motion.kind != MotionKind.DWELL:
             self.frame_unknown = None if motion.end.in_frame is None else lost

@@ -353,7 +353,7 @@ def test_codes_that_end_something_act_at_the_end_of_their_block() -> None:
     turns = np.degrees(moves.end[:, 3] - moves.start[:, 3])
     assert turns[1] == pytest.approx(20.0)
     assert moves.compensated.tolist() == [False, True, False]
-    rules = follow("M144\nL X+1 F100 M145\nL X+2").moves.rule.tolist()
+    rules = follow("M144\nL X+1 F100 M145\nL X+2 FMAX").moves.rule.tolist()
     assert rules == [Rule.REFUSE, Rule.CORRECT]
 
 

@@ -38,7 +38,7 @@ def test_a_size_of_an_arc_that_is_said_twice_is_an_error_of_the_block(block: str
 
 def test_m94_and_m138_name_axes_without_numbers() -> None:
     assert ends("L C+370 FMAX\nL C+380 M94 C FMAX", "XYZC")[-1] == [0, 0, 0, 380]
-    assert fates("L X+1 Y+1 Z+1 M138 C FMAX\nL X+2\nM138\nL X+3", "XYZBC")[1:] == [
+    assert fates("L X+1 Y+1 Z+1 M138 C FMAX\nL X+2\nM138\nL X+3 Y+1 Z+1 FMAX", "XYZBC")[1:] == [
         (Rule.REFUSE, "M138: the control takes only some of the rotary axes into account"),
         (Rule.CORRECT, ""),
     ]

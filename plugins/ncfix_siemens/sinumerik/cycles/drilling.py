@@ -317,7 +317,7 @@ def measure(control: Sinumerik, block: int, step: Calling) -> None:
     else:
         sets = number(control.variables.value("_knum"))
     if sets != 0.0 and step.name not in CALIBRATING:
-        control.suspend("measured", MEASURES.format(name))
+        control.suspend("measured", MEASURES.format(name), followed=True)
 
 
 def made(control: Sinumerik, block: int, *, refusal: str = "", passing: Passing | None = None) -> None:
