@@ -176,7 +176,8 @@ def test_increments_of_more_than_half_a_turn_are_not_led_by_a_guess() -> None:
 
 @pytest.mark.parametrize("on", ["M128", "FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS"])
 def test_a_datum_of_a_rotary_axis_may_turn_the_coordinates_of_the_tip(on: str) -> None:
-    body = f"L X+0 Y+0 Z+9 B+0 C+0 FMAX\nTRANS DATUM AXIS C+30\nL X+1 F100\n{on}\nL X+2 Y+0 Z+9\nTRANS DATUM RESET\nL X+3 Y+0 Z+9 FMAX"
+    body = "L X+0 Y+0 Z+9 B+0 C+0 FMAX\nTRANS DATUM AXIS C+30\nL X+1 F100\n"
+    body += f"{on}\nL X+2 Y+0 Z+9\nTRANS DATUM RESET\nL X+3 Y+0 Z+9 FMAX"
     moves = follow(body, "XYZBC").moves
     assert moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE, Rule.CORRECT]
     assert "turn with that datum" in moves.reasons[int(moves.reason[2])]
