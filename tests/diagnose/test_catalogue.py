@@ -77,7 +77,7 @@ WAVES = [("wCBXFZYSt", 1, 12.0), *([("wCBXFZYSt", 3, 6.0), ("wCAYFXZSt", 4, 20.0
 def test_a_name_that_another_covers_has_that_one_next_to_it(name: str, seed: int, size_um: float) -> None:
     """One wave of EZC a turn is a sag and a face run-out: a run-out may have more waves, a sag grows with the load.
 
-    The noise decides which is likelier; of 30 other worlds by up to 8 log odds, so it may be named alone.
+    The noise decides which is likelier: what it makes of the further waves is no reason to name one of them alone.
     """
     world, random = World.of(name, seed, 100), np.random.default_rng(seed)
     turned = world.data.q[:, world.machine.axis_names.index("C")][world.data.row]
@@ -89,6 +89,7 @@ def test_a_name_that_another_covers_has_that_one_next_to_it(name: str, seed: int
     others = found.selected.runners_up[first.candidate.name]
     second, third, *_ = sorted(others, key=lambda each: -others[each])
     assert {first.candidate.name, second} == {"gravity sag C", "axial C"}
+    assert first.aliases == (second,)
     assert others[third] < others[second] / 10
 
 

@@ -54,6 +54,13 @@ def test_a_bow_is_called_by_what_was_read(name: str):
     assert found.verdict == (FOUND if name in ("EXX", "EAX") else AMBIGUOUS)
 
 
+@pytest.mark.parametrize(("unit", "said"), [(1.0, False), (25.4, True), (1e3, True)])
+def test_repeats_that_agree_better_than_machines_come_back_are_remarked(unit: float, said: bool):
+    """0.4 um in mm are 0.016 um in inches; where the file has no curve nothing else tells such a unit."""
+    found = diagnose([laser("EXX", unit=unit)], MILL)
+    assert ("NCF616" in {message.code for message in found.messages}) is said
+
+
 def test_two_bows_that_have_nothing_to_do_with_each_other_are_no_sag():
     assert sorted(names(diagnose([laser("EXX"), laser("EYX", seed=2)], MILL))) == ["EXX", "EYX"]
 

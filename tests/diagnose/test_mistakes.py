@@ -133,6 +133,23 @@ def test_a_mistake_is_found_by_its_odds(kind: str, data: Measurement, known: Mac
     assert wrong.after_um < 0.6 * wrong.before_um
 
 
+@pytest.mark.parametrize("kind", ["unit of values: inch", "inch"])
+def test_a_unit_is_no_squareness_that_moved(kind: str) -> None:
+    """Where a file has squarenesses alone, other ones explain a wrong unit to the last digit, and so does a table."""
+    lines = machine("three_axis")
+    square = [Effect(name, (size,)) for name, size in (("EC0Y", 20e-6), ("EB0Z", -15e-6), ("EA0Z", 12e-6))]
+    lines = lines.replace(effects=tuple(square))
+    rows = np.sort(np.r_[np.arange(60), np.repeat(np.arange(0, 40, 4), 3)])
+    right = simulate(plan(lines, "tcp", 60, 5).rows(rows), lines, Faults(2.0), 5)
+    right = replace(right, headers=())  # the noise comes from repeats: it is in the wrong unit, too
+    assert find([right], lines) is None
+    wrong = find([CASES[kind](right, lines)[0]], lines)
+    assert wrong is not None
+    assert wrong.sure
+    assert wrong.name == kind.split(":")[0]
+    assert "inch" in wrong.title
+
+
 UNITS = [kind for kind in CASES if kind.split(":")[0] in ("unit of values", "inch", "metre", "um", "degree")]
 
 

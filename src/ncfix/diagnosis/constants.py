@@ -20,6 +20,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import chdtrc, logsumexp
 
+from ncfix.diagnosis.effect_form import side_by_side
 from ncfix.diagnosis.evidence import FURTHER, SURE, Evidence, Member, marginal
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.machine.effects import Unit, units
@@ -148,15 +149,22 @@ class FileLikelihood:
         return self.data.base[:, : self.data.base.shape[1] - len(self.data.coefficients)]
 
     @cached_property
-    def root(self) -> Array:
-        """The root of the inverse covariance of the values, (m, m): it makes noise and background white."""
-        found: Array = cholesky(self.evidence.background.precision(self.share), check_finite=False)
-        return found
+    def white(self) -> tuple[list[Array], float]:
+        """Where noise and background are white: the set-up (m, j), members at their sizes (m, p), constants (m, k) and
+        the values from the file (m, 1); and the log determinant of their covariance.
+
+        The root of the inverse covariance that makes them so, (m, m), is let go of at once.
+        """
+        groups = self.evidence.groups
+        named = [m.size * groups[m.group].columns for m in self.members]
+        parts = (self.setup, side_by_side([self.setup[:, :0], *named]), self.constants, self.from_file[:, None])
+        root = cholesky(self.evidence.background.precision(self.share), check_finite=False)
+        return [root @ part for part in parts], -2 * float(np.log(np.diag(root)).sum())
 
     @cached_property
     def free(self) -> tuple[Array, float]:
         """An orthonormal basis of the white set-up, and the log of its determinant."""
-        white = self.root @ self.setup
+        white = self.white[0][0]
         size = np.linalg.norm(white, axis=0)
         scaled = white[:, size > 0] / size[size > 0]
         left, values, _ = np.linalg.svd(scaled, full_matrices=False)
@@ -169,20 +177,15 @@ class FileLikelihood:
         return np.array([self.data.size(column) for column in self.constants.T])
 
     @cached_property
-    def _columns(self) -> tuple[Array, Array, int]:
-        """White members at their sizes and constants of 1 um, beside the set-up; the data; how many are members'."""
-        groups = self.evidence.groups
-        named = [m.size * groups[m.group].columns for m in self.members]
-        unit = self.constants / np.where(self.sizes > 0, self.sizes, 1.0)
-        columns = np.concatenate([np.zeros((len(unit), 0)), *named, unit], axis=1)
-        basis, _ = self.free
-        white = without(basis, self.root @ np.column_stack([columns, self.from_file]))
-        return white[:, :-1], white[:, -1], columns.shape[1] - unit.shape[1]
-
-    @cached_property
     def _products(self) -> tuple[Array, Array, float]:
-        columns, y, _ = self._columns
-        return columns.T @ columns, columns.T @ y, float(y @ y)
+        """Inner products beside the set-up of white members at their sizes and constants of 1 um: with themselves, with
+        the values; and of these.
+        """
+        _, named, constants, y = self.white[0]
+        unit = constants / np.where(self.sizes > 0, self.sizes, 1.0)
+        left = without(self.free[0], np.concatenate([named, unit, y], axis=1))
+        inner = left.T @ left
+        return inner[:-1, :-1], inner[:-1, -1], float(inner[-1, -1])
 
     def likelihood(self, moved: Sequence[int] = ()) -> float:
         """Log likelihood of the values with the members and these constants (their numbers) off, of whatever size."""
@@ -196,7 +199,7 @@ class FileLikelihood:
 
     def _at(self, moved: Sequence[int], size: float) -> float:
         inner, seen, total = self._products
-        named = self._columns[2]
+        named = self.white[0][1].shape[1]
         places = [*range(named), *(named + k for k in moved)]
         scale = np.concatenate([np.ones(named), np.full(len(moved), size)])
         gram = np.eye(len(places)) + scale[:, None] * inner[np.ix_(places, places)] * scale
@@ -205,7 +208,7 @@ class FileLikelihood:
         freedom, basis = self.evidence.background.freedom, self.free
         count = len(self.from_file) - basis[0].shape[1]
         squares = max(total - float(own @ own), 0.0)
-        determinant = 2 * float(np.log(np.diag(factor)).sum() - np.log(np.diag(self.root)).sum()) + basis[1]
+        determinant = 2 * float(np.log(np.diag(factor)).sum()) + self.white[1] + basis[1]
         return marginal(squares, determinant, count, freedom)
 
     def solution(self, first: Sequence[int] = ()) -> Solution:
@@ -213,21 +216,18 @@ class FileLikelihood:
 
         Of constants of which only a combination is seen those in `first` are kept, and the others held.
         """
-        groups = self.evidence.groups
-        named = [m.size * groups[m.group].columns for m in self.members]
-        beside = np.concatenate([self.setup, *named], axis=1)
-        extra = beside.shape[1] - self.setup.shape[1]
-        prior = np.concatenate([np.zeros((extra, self.setup.shape[1])), np.eye(extra)], axis=1)
-        scale = np.linalg.norm(self.setup, axis=0)
-        beside[:, : len(scale)] /= np.where(scale > 0, scale, 1.0)
-        still = np.zeros((extra, len(self.data.coefficients)))
+        setup, named, constants, y = self.white[0]
+        extra, scale = named.shape[1], np.linalg.norm(self.setup, axis=0)
+        beside = np.concatenate([setup / np.where(scale > 0, scale, 1.0), named], axis=1)
+        prior = np.concatenate([np.zeros((extra, setup.shape[1])), np.eye(extra)], axis=1)
+        still = np.zeros((extra, constants.shape[1]))
         limits = self.data.problem.limits.copy()
         limits[list(first)] = np.inf  # what is seen little with all others free may be seen well by itself
         order = np.array([*first, *(k for k in range(still.shape[1]) if k not in set(first))], dtype=np.int64)
         found = solve(
-            np.concatenate([self.root @ self.constants, still])[:, order],
-            np.concatenate([self.root @ beside, prior]),
-            np.concatenate([self.root @ self.from_file, np.zeros(extra)]),
+            np.concatenate([constants, still])[:, order],
+            np.concatenate([beside, prior]),
+            np.concatenate([y[:, 0], np.zeros(extra)]),
             limits[order],
         )
         return _renumbered(found, order)
@@ -243,7 +243,7 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
     solution = asked.solution(chosen)
     kept = solution.kept
     chosen = [each for each in chosen if each in kept]
-    scale = _noise(evidence, members, share)
+    scale = evidence.noise(members, share)
     inner = _inverse(solution.covariance)
     full = solution.change[kept]
     seen = inner @ full
@@ -305,12 +305,6 @@ def names_of(selection: Selection) -> list[str]:
     """A name for each free constant: of its effect where that has no other, else with the power."""
     names = [effect.name for effect in selection.estimated for _ in range(effect.basis.size)]
     return [name if names.count(name) == 1 else label for name, label in zip(names, selection.labels, strict=True)]
-
-
-def _noise(evidence: Evidence, members: Sequence[Member], share: float) -> float:
-    """The variance of the noise with all constants free against what was taken for it before the data were seen."""
-    count, freedom = len(evidence.y), evidence.background.freedom
-    return float((evidence.squares(members, share) + freedom) / (count + freedom))
 
 
 def _gained(inner: Array, seen: Array, places: Index) -> float:

@@ -364,8 +364,7 @@ def _constants(case: Case) -> float:
 
 def _sigma(evidence: Evidence, members: Sequence[Member], share: float) -> float:
     """Noise of one value, um, with the members there."""
-    freedom, count = evidence.background.freedom, len(evidence.y)
-    return evidence.background.sigma * float(np.sqrt((evidence.squares(members, share) + freedom) / (count + freedom)))
+    return evidence.background.sigma * float(np.sqrt(evidence.noise(members, share)))
 
 
 def diagnose(

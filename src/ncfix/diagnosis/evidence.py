@@ -291,10 +291,11 @@ class Evidence:
         found = self._likelihoods(members, beside)
         return [(float(own), share) for own, share in zip(found, SHARES, strict=True) if np.isfinite(own)]
 
-    def squares(self, members: Sequence[Member], share: float) -> float:
-        """The sum of squares of the data in units of their covariance with these members."""
+    def noise(self, members: Sequence[Member], share: float) -> float:
+        """The variance of the noise with these members against what was taken for it before the data were seen."""
         _, own = self._solved(members, None, share)
-        return self._inner(share).squares - float(own @ own)
+        squares, freedom = self._inner(share).squares - float(own @ own), self.background.freedom
+        return (squares + freedom) / (len(self.y) + freedom)
 
     def _likelihoods(self, members: Sequence[Member], beside: Array | None) -> Array:
         """For every share, its probability beforehand counted in, (shares,); -inf for those far from the likeliest.

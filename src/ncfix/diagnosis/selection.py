@@ -32,6 +32,8 @@ OVERLAP = 0.25
 """Share of what a name shows that another must be able to show to be an alias, however likely it is in its place."""
 TOLD_APART = 6.0
 """Squared noise units of what the first shows that the second cannot, from which on data tell them apart."""
+DOUBT = 3.0
+"""Standard deviations of what noise shows, on top of its mean, that are no such squares."""
 MOST = 5
 """Effects that are taken to be there at most."""
 TRIED = 5
@@ -59,14 +61,31 @@ FEW_SHOWN = 0.5
 
 
 def untold(scale: Comparison, selected: Selected, name: str, other: str) -> float:
-    """Squared noise units of what a member shows that another name cannot, with its best form."""
+    """Squared noise units of what a member shows that another name cannot, with its best form, beyond what noise may
+    bring; zero where the errors of both, as fitted to these data, are the same but for noise.
+    """
     return _untold(scale.evidence, scale.all(selected.members), selected.members[name], other)
 
 
 def _untold(evidence: Evidence, members: Sequence[Member], own: Member, other: str) -> float:
-    share, largest = evidence.share(members), evidence.background.data.sizes[-1]
-    shown = _white(evidence, own.group, share) @ evidence.numbers(members, share)[list(members).index(own)]
-    return min(_unexplained(shown, largest * _leading(evidence, form, share)) for form in evidence.forms[other])
+    """With numbers z = P K'y behind all members K, P = (1 + K'K)^-1, of which noise alone has the covariance P K'K P:
+    a member of many numbers shows a little of each by noise, and none of that tells it from a name of fewer.
+    """
+    share, place = evidence.share(members), list(members).index(own)
+    parts = [member.size * _white(evidence, member.group, share) for member in members]
+    columns = np.concatenate(parts, axis=1)
+    inner = columns.T @ columns
+    solved, start = np.linalg.inv(np.eye(len(inner)) + inner), sum(part.shape[1] for part in parts[:place])
+    mine = slice(start, start + parts[place].shape[1])
+    numbers = (solved @ (columns.T @ (evidence.y / np.sqrt(evidence.background.variance(share)))))[mine]
+    spread, noise = (solved @ inner @ solved)[mine, mine], evidence.noise(members, share)
+    beyond = []
+    for form in evidence.forms[other]:
+        left = _unexplained(parts[place], evidence.background.data.sizes[-1] * _leading(evidence, form, share))
+        by_noise = left @ spread
+        usual = np.trace(by_noise) + DOUBT * np.sqrt(2 * np.trace(by_noise @ by_noise))
+        beyond.append(float(numbers @ left @ numbers) / noise - float(usual))
+    return max(min(beyond), 0.0)
 
 
 def _overlap(evidence: Evidence, members: Sequence[Member], own: Member, other: str) -> bool:
@@ -83,24 +102,26 @@ def _white(evidence: Evidence, group: int, share: float) -> Array:
 
 
 def _leading(evidence: Evidence, group: int, share: float) -> Array:
-    """The same of the effect itself: what only comes with it, as a constant with a play, stands in no name's place."""
+    """The same of the effect itself, each column 1 um at the tool tip: its shape in the catalogue does not count, nor
+    what only comes with it, as a constant with a play, which stands in no name's place.
+    """
     form, background = evidence.groups[group], evidence.background
-    effects = form.owner.effects[: form.owner.lead]
-    if not effects:
-        return _white(evidence, group, share)
-    own = form.loading[: sum(effect.basis.size for effect in effects)]
-    there = (form.single != 0).any(axis=1)  # of two dates those of the later one only
-    columns = np.where(there[:, None], background.data.design(effects) @ own, 0.0)
-    return background.seen(columns) / np.sqrt(background.variance(share))[:, None]
+    sizes, effects = np.sqrt((form.columns**2).sum(axis=0)), form.owner.effects[: form.owner.lead]
+    columns = form.columns
+    if effects:
+        own = form.loading[: sum(effect.basis.size for effect in effects)]
+        there = (form.single != 0).any(axis=1)  # of two dates those of the later one only
+        columns = np.where(there[:, None], background.data.design(effects) @ own, 0.0)
+    scaled = columns * np.sqrt(background.data.count) / np.where(sizes > 0, sizes, 1.0)
+    return background.seen(scaled) / np.sqrt(background.variance(share))[:, None]
 
 
-def _unexplained(shown: Array, sized: Array) -> float:
-    """Squares of what is shown that columns of the largest size cannot show, and of the numbers behind them.
-
-    Without the latter a combination that hardly shows could stand for anything.
+def _unexplained(shown: Array, sized: Array) -> Array:
+    """Inner products (k, k) of what of some columns (n, k) others of the largest size cannot show, and of the numbers
+    behind those. Without the latter a combination that hardly shows could stand for anything.
     """
     seen = sized.T @ shown
-    return float(shown @ shown - seen @ np.linalg.solve(np.eye(sized.shape[1]) + sized.T @ sized, seen))
+    return shown.T @ shown - seen.T @ np.linalg.solve(np.eye(sized.shape[1]) + sized.T @ sized, seen)
 
 
 def _shared(columns: Array, by: Array) -> float:

@@ -21,7 +21,7 @@ from ncfix.diagnosis.mistakes.kinds import (
     not_of_first_order,
 )
 from ncfix.diagnosis.mistakes.mistake import Mistake
-from ncfix.diagnosis.mistakes.units import looks_typed
+from ncfix.diagnosis.mistakes.units import looks_typed, units
 from ncfix.diagnosis.residual_data import (
     AS_IT_STANDS_UM,
     TIGHT_UM,
@@ -90,7 +90,9 @@ def _suspects(
 ) -> list[Mistake]:
     """Mistakes that may be behind what the file leaves, with their log odds.
 
-    If none is likely, but constants of the file would have to move to explain the data: those that spare them that.
+    If none is likely, but constants of the file would have to move to explain the data: those that spare them that. In
+    inches a squareness is one of 25.4 times the size, so then units of positions are asked for, too. What is left is
+    compared in the unit of the file.
     """
     left, standing = now.left(), now.left(AS_IT_STANDS_UM)
     far = left >= SUSPECT * now.noise or any(looks_typed(effect) for effect in machine.effects)
@@ -102,8 +104,9 @@ def _suspects(
     tried = _judged(measurements, machine, now, TIGHT_UM, deep, refused)
     if moved and not any(each.odds > 0 for each in tried):
         most = OTHERWISE * (standing**2 - left**2)
-        tried = _judged(measurements, machine, now, AS_IT_STANDS_UM, (), refused)
-        tried = [each for each in tried if each.after_um**2 - left**2 < most]
+        deep = [each for each in units(measurements, machine) if plain(each.name) not in refused]
+        tried = _judged(measurements, machine, now, AS_IT_STANDS_UM, deep, refused)
+        tried = [each for each in tried if (each.after_um / each.stretch) ** 2 - left**2 < most]
     return tried
 
 
