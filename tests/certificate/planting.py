@@ -36,6 +36,10 @@ SETUP = Setup(
 GIVEN = Given(offsets=SETUP.work_offsets, tools={1: 80.0}, initial=SETUP.initial)
 STEP = 0.001
 """mm, the last digit in which all these programs are written; the machines resolve as much or less."""
+CYCLE_NUMBERS = re.compile(r"(?<=CYCLE8\d)\(|(?<=CYCL DEF 200) |^ +Q2|(?<=FN [12]: Q203)|(?<=G8[123]) | R(?=-?\d+\.)")
+"""Where the numbers of a drilling cycle begin in a line."""
+CALLS_HOLE = re.compile("MCALL|FN [12]")
+DIGITS = re.compile(r"(?<![\dQ])[+-]?\d+\.?\d*")
 LETTER = re.compile(r"(?<![A-Z])([XYZAC])(=?)([+-]?\d+\.?\d*)")
 
 
@@ -104,6 +108,48 @@ class Writer:
         else:
             self.put(f"G{sense} {self.word('X', self.at['X'])} {self.word('Y', self.at['Y'])} I{i:.3f} J{j:.3f}")
 
+    def drill(self) -> None:
+        """Some holes in a row, down from a level and up to it, or higher."""
+        rng = self.rng
+        level, deep, feed = (rng.randint(*span) for span in ((20, 40), (2, 30), (50, 300)))
+        bottom, high = round(level - deep - rng.random(), 3), level + rng.choice((0, 60))
+        places = rng.choice((["XY"], ["XY", "X", "XY"], ["XY", "Y"]))
+        if self.language == "siemens":
+            way = rng.choice((f"{bottom}", f",{round(level - bottom, 3)}"))
+            cycle = rng.choice((f"CYCLE81({high},{level},2,{way})", f"CYCLE82({high},{level},1.5,{bottom},,0.4)"))
+            if rng.random() < 0.4:
+                cycle = f"CYCLE83({high},{level},2,{bottom},,{round(level - 1.5, 3)},,{min(deep, 3)},0.5,0,1,0)"
+            if rng.random() < 0.3:
+                self.motion(True, "XY")
+                self.put(cycle)
+            else:
+                self.put(f"MCALL {cycle}")
+                for axes in places:
+                    self.motion(True, axes)
+                self.put("MCALL")
+        elif self.klartext:
+            words = [f"Q200=+{rng.choice((1, 2.5))}", f"Q201={bottom - level:+.3f}", f"Q206=+{feed}", "Q202=+5"]
+            words += ["Q210=+0", f"Q203={level:+}", f"Q204=+{high - level}", "Q211=+0"]
+            lines = rng.random() < 0.5
+            self.put("CYCL DEF 200 DRILLING ~" if lines else f"CYCL DEF 200 DRILLING {' '.join(words)}")
+            self.lines += [f"    {word} ;VALUE{'' if word is words[-1] else ' ~'}" for word in words] if lines else []
+            for axes in places:
+                self.motion(True, axes)
+                if rng.random() < 0.3:
+                    self.put("CYCL CALL")
+                else:
+                    self.lines[-1] += " M99"
+        else:
+            code = rng.choice(("G81", "G82 P200", "G83 Q3."))
+            self.put(
+                f"{rng.choice(('G98', 'G99'))} {code} {self.word('X', self.place('X'))} "
+                f"{self.word('Y', self.place('Y'))} Z{bottom:.3f} R{level}. F{feed}"
+            )
+            for axes in places[1:]:
+                self.put(" ".join(self.word(axis, self.place(axis)) for axis in axes))
+            self.put("G80")
+        self.motion(True, "XYZ")
+
     def note(self, text: str) -> None:
         plain = self.language in ("siemens", "heidenhain")
         self.put(f"; {text}" if plain else f"({text})")
@@ -121,6 +167,8 @@ class Writer:
             choice = rng.random()
             if choice < 0.12 and not self.five:
                 self.arc()
+            elif choice < 0.15 and not self.five:
+                self.drill()
             elif choice < 0.2:
                 self.motion(True, "".join(rng.sample("XYZ", 2)))
             elif choice < 0.25:
@@ -243,6 +291,7 @@ class Draft:
         known = set(case.original.decode().splitlines())
         self.klartext, numbered = case.language == "heidenhain", case.numbered
         self.path = [k for k, line in enumerate(self.lines) if LETTER.search(line) and "ncfix" not in line.lower()]
+        self.put_in = [k for k, line in enumerate(self.lines) if line not in known and CALLS_HOLE.search(line)]
         self.touched = [k for k in self.path if self.lines[k] not in known]
         self.ends = [k for k in self.touched if numbered and not self._added(k + 1)] if numbered else []
         self.heads = [k for k in self.ends if not self._added(k)]
@@ -308,7 +357,7 @@ def dropped_line(draft: Draft) -> bool:
     """A line of the original is gone."""
     spare = [k for k, line in enumerate(draft.lines) if line.strip() and "ncfix" not in line.lower()]
     at = draft.rng.choice(draft.heads if draft.heads and draft.rng.random() < 0.7 else spare)
-    if at in draft.path and at not in draft.heads:
+    if at not in draft.heads and (at in draft.path or at in draft.put_in):
         return False
     del draft.lines[at]
     return True
@@ -353,6 +402,26 @@ def stale_stamp(draft: Draft) -> bool:
     return True
 
 
+def wrong_cycle(draft: Draft) -> bool:
+    """Another digit in a number of a drilling cycle, or of what goes round a hole."""
+    spots = [
+        (at, number)
+        for at, line in enumerate(draft.lines)
+        if (where := CYCLE_NUMBERS.search(line)) is not None
+        for number in DIGITS.finditer(line, where.start())
+    ]
+    if not spots:
+        return False
+    at, found = draft.rng.choice(spots)
+    text, line = found[0], draft.lines[at]
+    where = draft.rng.choice([k for k, c in enumerate(text) if c.isdigit()])
+    other = text[:where] + draft.rng.choice([c for c in "0123456789" if c != text[where]]) + text[where + 1 :]
+    if abs(float(other) - float(text)) < STEP / 2:
+        return False
+    draft.lines[at] = line[: found.start()] + other + line[found.end() :]
+    return True
+
+
 def unsplit(draft: Draft) -> bool:
     """The pieces of a straight motion at feed made one again: its way leaves the tolerance."""
     many = [k for k in draft.ends if draft._added(k) and draft._added(k - 1)]
@@ -373,7 +442,7 @@ def unsplit(draft: Draft) -> bool:
 
 
 KINDS: tuple[Callable[[Draft], bool], ...] = (
-    digit, lost_word, doubled_word, dropped_line, wrong_sign, swapped_axes, stale_stamp, unsplit,
+    digit, lost_word, doubled_word, dropped_line, wrong_sign, swapped_axes, stale_stamp, wrong_cycle, unsplit,
 )  # fmt: skip
 
 

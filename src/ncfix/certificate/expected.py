@@ -59,6 +59,7 @@ class Expected:
         ours, theirs = (follower_of(text.family, machine.axis_names, given, self.model) for text in (first, second))
         self.ours, self.theirs = ours.run(first), theirs.run(second)
         self.foreign = ours.foreign
+        self.calls, self.calls_there = ours.calls, theirs.calls
         self.tolerance = (second.stamp.tolerance_um if second.stamp else tolerance_um) / 1e3
         self._halves: dict[tuple[Any, ...], Array] = {}
         self._near: dict[float, Array] = {}

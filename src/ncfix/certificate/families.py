@@ -15,9 +15,10 @@ from ncfix.certificate.following import (
     AxisFollower,
     Given,
 )
+from ncfix.certificate.holes import HoleCall
 from ncfix.certificate.klartext import KlartextFollower
 from ncfix.certificate.model import TipModel
-from ncfix.certificate.reading import AXES, Family, TextLine, TextWord
+from ncfix.certificate.reading import AXES, CYCLE_CALL, Family, TextLine, TextWord
 from ncfix.certificate.steps import NAN, AxisStep, Kind
 from ncfix.certificate.turning import SwivelCall, turned
 
@@ -48,8 +49,11 @@ class WordAddressFollower(AxisFollower):
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
-        if line.plain and line.path and not self.lost and self._leads_straight(line):
+        if line.plain and line.path and not self.lost and self.modal_call is None and self._leads_straight(line):
             return self.straight(row, line)
+        cycle = next((word.name for word in line.codes if re.fullmatch(CYCLE_CALL, word.name)), "")
+        if cycle:
+            return self._call(row, line, cycle)
         codes = [round(10 * word.value) for word in line.codes if word.name == "G" and word.value is not None]
         if line.odd and (codes or line.path):
             self.lost["odd"] = line.odd
@@ -74,11 +78,34 @@ class WordAddressFollower(AxisFollower):
         if self.kind is Kind.HOLE:
             return self._hole(row, line, words)
         arc = self.kind is Kind.ARC
+        if self.modal_call is not None:
+            return self._hole_after(row, line, words, self.modal_call)
         if len(line.path) > len(words) and not arc:  # such as R or RND
             return self.step(row, self.kind, dict(self.at), line, UNKNOWN_WORDS)
         start = dict(self.at)
         step = self.step(row, self.kind, self.target({k: v for k, v in words.items() if k in self.at}), line)
         return self._arc_of_words(step, line, start) if arc and not step.why else step
+
+    def _call(self, row: int, line: TextLine, cycle: str) -> AxisStep | None:
+        """A line with a drilling cycle: a hole where the axes stand, or with MCALL behind each motion that follows."""
+        names = [word.name for word in line.codes if word.name != "N"]
+        call = HoleCall.of_arguments(cycle)
+        if call is not None and names == ["MCALL", cycle] and not line.path:
+            self.modal_call = call
+        elif call is not None and names == [cycle] and not line.path and self.modal_call is None:
+            return self.called_hole(row, line, dict(self.at), call)
+        else:
+            self.foreign.add(row)
+            self.lost[cycle] = "a drilling cycle that this reader does not know"
+        return None
+
+    def _hole_after(self, row: int, line: TextLine, words: Mapping[str, TextWord], call: HoleCall) -> AxisStep:
+        """The modal cycle behind a motion."""
+        if self.kind is Kind.ARC or len(line.path) > len(words):
+            step = self.step(row, Kind.HOLE, dict(self.at), line, UNKNOWN_WORDS)
+            step.foreign = True
+            return step
+        return self.called_hole(row, line, self.target({k: v for k, v in words.items() if k in self.at}), call)
 
     def _smooths(self, line: TextLine, codes: Sequence[int]) -> bool:
         """Whether a line does nothing but say how the control smooths the path, and for which axes (G5.1 Q2 X0 Y0)."""
@@ -357,10 +384,12 @@ class WordAddressFollower(AxisFollower):
     def _modal_call(self, alone: bool) -> None:
         """MCALL: alone it ends the modal call, and with that what was not followed because of it."""
         if alone:
-            self.lost = {key: why for key, why in self.lost.items() if not CYCLES.match(key)}
-            self.forget()
+            left = {key: why for key, why in self.lost.items() if not CYCLES.match(key)}
+            if len(left) < len(self.lost):
+                self.forget()
+            self.lost, self.modal_call = left, None
         else:
-            self.lost["MCALL"] = "a modal call"
+            self.lost["MCALL"], self.modal_call = "a modal call", None
 
     def _sinumerik_word(self, word: TextWord) -> None:
         """A variable that gets a value, or a word that does something."""
@@ -428,6 +457,9 @@ class WordAddressFollower(AxisFollower):
         if not self.returns_to_level and not level >= self.before_cycle:
             # before G98 or G99 the control has its own way back
             back = NAN if self.returns_to_level is None else self.before_cycle
+        if not step.why and not math.isnan(level):
+            zero, ends = self.offset("Z"), bottom["Z"]
+            self.calls[row] = HoleCall("", ((level - zero) / self.unit,), {0: 1}, (ends - zero) / self.unit, back)
         self.at = {**bottom, "Z": back}
         self.said["Z"] = self.said_before or back != self.before_cycle
         return step

@@ -15,6 +15,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.certificate.holes import HoleCall
 from ncfix.certificate.model import TipModel
 from ncfix.certificate.reading import AXES, JUMPS, Family, TextLine, TextWord
 from ncfix.certificate.steps import NAN, AxisStep, Floats, Kind, ModesInForce, ProgramSteps, StraightRun
@@ -117,6 +118,10 @@ class AxisFollower:
         self.returns_to_level: bool | None = None
         self.before_cycle, self.said_before = NAN, False
         """Where Z stood before the cycles, and whether the program has brought it there."""
+        self.calls: dict[int, HoleCall] = {}
+        """The cycles of holes that are called and not written in full, by their lines."""
+        self.modal_call: HoleCall | None = None
+        """MCALL: the cycle that follows each motion."""
         self.pole: dict[str, float] = {}
         self.shifts: dict[str, float] = {}
         """What the program itself adds to the numbers of axes, mm or degree: G92, TRANS."""
@@ -174,6 +179,8 @@ class AxisFollower:
         """The steps of lines that only bring axes straight to places; None if that takes more than columns."""
         klartext = self.family is Family.KLARTEXT
         if not klartext and (self.kind is None or self.kind > Kind.FEED) and lines.code[row] < 0:
+            return None
+        if self.modal_call is not None:
             return None
         if self.turn is not None and self.turn.tilted and self.length != self.tip_length():
             return None
@@ -424,6 +431,17 @@ class AxisFollower:
             unsteady=self.beside,
             by_vector=self.by_vector and self.tcp,
         )
+
+    def called_hole(self, row: int, line: TextLine, over: dict[str, float], call: HoleCall) -> AxisStep:
+        """The step of a hole whose cycle is called over a place, in G17."""
+        offset, unit = self.offset("Z"), self.scale("Z")
+        self.said["Z"] = True
+        why = "" if self.plane == 17 and not self.counting else "a drilling cycle that this reader does not know"
+        step = self.step(row, Kind.HOLE, {**over, "Z": offset + unit * call.bottom}, line, why)
+        step.foreign |= bool(why)
+        self.at = {**over, "Z": offset + unit * call.level}
+        self.calls[row] = call
+        return step
 
     def circle(self, step: AxisStep, centre: Mapping[str, float], clockwise: bool, radius: float | None) -> AxisStep:
         """Give a step the circle that its words describe."""

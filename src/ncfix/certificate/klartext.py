@@ -10,11 +10,14 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix.certificate.following import INCH, NO_POLE, AxisFollower, Given
+from ncfix.certificate.holes import HoleCall, assign
 from ncfix.certificate.model import TipModel
 from ncfix.certificate.reading import AXES, RETRACTS, Family, TextLine, TextWord
 from ncfix.certificate.steps import NAN, AxisStep, Kind
 from ncfix.certificate.turning import PlaneBlock, about
 
+HOLES = re.compile(r"CYCL DEF (20[0-35-79]|24[01])\b")
+"""Cycles for holes whose bottom is Q203 + Q201."""
 FRAMES = re.compile(r"CYCL DEF (?:7|8|9|10|11|13|19|26)\b|PLANE|TRANS|FUNCTION")
 """Lines of Klartext that this reader does not follow, behind which blocks keep their form."""
 
@@ -34,16 +37,20 @@ class KlartextFollower(AxisFollower):
     """Follows Klartext.
 
     datum     CYCL DEF 247 has begun, and its number is still to come
+    drilling  which cycle for holes is defined
     oversize  mm, what the last tool call adds to the length of the tool (DL)
     worked_out  Q120 to Q122, the positions of A, B and C for the last plane, degrees
     """
 
     datum = False
+    drilling = 0
     oversize = 0.0
 
     def __init__(self, axes: Sequence[str], family: Family, given: Given, model: TipModel | None) -> None:
         super().__init__(axes, family, given, model)
         self.worked_out: dict[str, float] = {}
+        self.parameters: dict[str, float | None] = {}
+        """Q parameters that got plain numbers; None for those that got others."""
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
@@ -52,6 +59,8 @@ class KlartextFollower(AxisFollower):
         lead = line.codes[0].name if line.codes else ""
         if line.odd:
             return self._odd(row, line, lead)
+        if lead.startswith("CYCL CALL"):
+            return self._hole(row, line, dict(self.at))
         if self._took_statement(lead):
             return None
         self._klartext_words(line)
@@ -109,9 +118,13 @@ class KlartextFollower(AxisFollower):
         elif lead in ("M128", "M129"):
             self.by_vector = False
             self.lead(lead == "M128")
+        elif lead.startswith(("CYCL DEF 2", "FN", "Q")):
+            if found := HOLES.match(lead):
+                self.drilling = int(found[1])
+            assign(lead, self.parameters)
         else:
             return lead.startswith(
-                ("BLK FORM", "END PGM", "TOOL DEF", "LBL ", "CYCL DEF 32", "FN", "Q", "CYCL DEF 7.0", "CYCL DEF 10.0")
+                ("BLK FORM", "END PGM", "TOOL DEF", "LBL ", "CYCL DEF 32", "CYCL DEF 7.0", "CYCL DEF 10.0")
             )
         return True
 
@@ -205,6 +218,8 @@ class KlartextFollower(AxisFollower):
         end = self.target({k: v for k, v in words.items() if k in self.at})
         if turn is not None:
             end |= self._turned_about_pole(turn)
+        if any(word.name == "M" and word.value == 99 for word in line.codes):
+            return self._hole(row, line, end)
         step = self.step(row, self.kind, end, line)
         if lead == "L" or step.why:
             return step
@@ -217,6 +232,14 @@ class KlartextFollower(AxisFollower):
         if radius is not None and radius.value is not None:
             return self.circle(step, {}, "DR-" in keys, radius.value * self.unit)
         step.why = "an arc without a radius"
+        return step
+
+    def _hole(self, row: int, line: TextLine, over: dict[str, float]) -> AxisStep:
+        """The cycle that is defined, over a place."""
+        call = HoleCall.of_parameters(self.drilling, self.parameters)
+        step = self.called_hole(row, line, over, call)
+        if not self.drilling or math.isnan(call.bottom):
+            step.why, step.foreign = step.why or "a drilling cycle that this reader does not know", True
         return step
 
     def _arc_about_pole(self, step: AxisStep, turn: TextWord | None, clockwise: bool) -> AxisStep:
@@ -274,7 +297,7 @@ class KlartextFollower(AxisFollower):
                         self.lead(word.value == 128)
                     case 126 | 127:
                         self.shortest = word.value == 126
-                    case 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 | 8 | 9 | 13 | 14 | 30 | 91 | 92 | 107 | 108 | 120:
+                    case 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 | 8 | 9 | 13 | 14 | 30 | 91 | 92 | 99 | 107 | 108 | 120:
                         self.auxiliary(word)
                     case _:
                         self.lost[f"M{word.number}"] = f"M{word.number} is not known to this reader"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from array import array
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import field
 from typing import NamedTuple, overload
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.findings import BlockFault
+from ncfix.certificate.holes import HoleCall, calls_only, hole_text, puts_back
 from ncfix.certificate.reading import NUMBER, Family, TextLine
 from ncfix.certificate.text import Text, hash_of
 from ncfix.values import mutable
@@ -118,6 +119,7 @@ class Pairing:
     moves: Callable[[int], bool]
     followed: Callable[[int], bool]
     foreign: Callable[[int], bool]
+    holes: tuple[Collection[int], Collection[int]] = ((), ())
     pairs: LinePairs = field(default_factory=LinePairs)
     faults: list[BlockFault] = field(default_factory=list)
     unsure: set[int] = field(default_factory=set)
@@ -126,7 +128,7 @@ class Pairing:
     def run(self) -> None:
         """Find `pairs` and `faults`."""
         ours, theirs = self.original.lines, self.corrected.lines
-        own, other = self._keys(self.original), self._keys(self.corrected)
+        own, other = self._keys(self.original, self.holes[0]), self._keys(self.corrected, self.holes[1])
         i = j = 0
         while i < len(ours) or j < len(theirs):
             if i < len(ours) and j < len(theirs) and own[i] == other[j] != NO_KEY:
@@ -137,11 +139,14 @@ class Pairing:
             else:
                 i, j = self._apart(own, other, i, j)
 
-    def _keys(self, text: Text) -> Sequence[int]:
-        """What the lines of a program hold besides a path and its pace, as a number; alike lines have the same."""
+    def _keys(self, text: Text, holes: Collection[int]) -> Sequence[int]:
+        """What the lines of a program hold besides a path and its pace, as a number; alike lines have the same.
+
+        holes  lines at which a cycle is called: other lines may say what they hold
+        """
         lines = text.read
         if lines is None:
-            return [_number(self._key(line)) for line in text.lines]
+            return [NO_KEY if row in holes else _number(self._key(line)) for row, line in enumerate(text.lines)]
         found = np.full(len(lines), NO_KEY)
         for shape, rows in lines.by_shape():
             begins = lines.begins[rows]
@@ -156,6 +161,7 @@ class Pairing:
                 )
                 keys = [self._key(lines[row]) for row in rows[some].tolist()]
                 found[rows] = np.array([_number(key) for key in keys])[which] ^ blocks[some][which] ^ blocks
+        found[list(holes)] = NO_KEY
         return array("q", found)
 
     def _key(self, line: TextLine) -> str | None:
@@ -163,6 +169,8 @@ class Pairing:
         if line.odd:
             return line.rest
         if line.plain and line.path and not line.rest:
+            return None
+        if calls_only(self.original.family, line):
             return None
         motion = MOTION.get(self.original.family, MOTION[Family.WORDS])
         rest = SKIP.sub("", line.rest, 1) if line.skipped else line.rest
@@ -211,9 +219,19 @@ class Pairing:
             return last
         ours, behind = self.original.lines, self.corrected.lines[last + 1]
         following = ours[min(row + 1, len(ours) - 1)]
+        if calls_only(self.original.family, behind):
+            return last + (self.moves(row) and self._puts_back(last + 1, following))
         feed = not behind.path and following.path != []
         pole = _begins(behind, "CC") and _begins(ours[row], *ARCS)
         return last + (feed or (pole and not _begins(following, "CC", *ARCS)))  # a pole before an arc belongs to that
+
+    def _puts_back(self, at: int, following: TextLine) -> bool:
+        """Whether a line that calls a hole, or gives it another depth, ends what was put round the hole before it."""
+        line, lines = self.corrected.lines[at], self.corrected.lines
+        if self.original.family is Family.KLARTEXT:
+            return line.rest.strip().upper().startswith("FN 2") and not following.says(line)
+        leads = at + 1 < len(lines) and bool(lines[at + 1].path)
+        return not (leads and "CYCLE" in line.rest.upper()) and not following.says(line)
 
     def _is_gone(self, row: int, at: int, end: int) -> bool:
         """Whether a line is not there any more: the next one leads where its correction should, and it does not."""
@@ -298,6 +316,30 @@ def _ahead(keys: Sequence[int], at: int, wanted: int) -> int:
 def _begins(line: TextLine, *names: str) -> bool:
     """Whether a line of Klartext begins with one of these words."""
     return bool(line.codes) and line.codes[0].name in names
+
+
+def hole_faults(pairing: Pairing, pair: LinePair, call: HoleCall) -> list[str]:
+    """What is wrong with the text of the lines that stand for a hole whose cycle is called."""
+    family, line = pairing.original.family, pairing.original.lines[pair.row]
+    pieces = pairing.corrected.lines[pair.first : pair.last + 1]
+    led, names = [piece for piece in pieces if piece.path], [word.name for word in line.path]
+    found = []
+    if any(piece.skipped != line.skipped for piece in pieces):
+        found.append("a line of the block has another mark of block delete")
+    if len(led) > 1 or any(piece.doubled() for piece in led):
+        found.append("two lines or two words lead to a hole")
+    if names != [word.name for piece in led for word in piece.path][: len(names)]:
+        found.append("the words of axes that lead to a hole have changed")
+    if family is Family.KLARTEXT and any(piece.block != line.block for piece in pieces):
+        found.append("the block has another number")
+    ours, theirs = (hole_text(family, lines) for lines in ([line], pieces))
+    if not line.path:  # then the tool is led there by a line that was added
+        theirs = [word for word in theirs if word.upper() not in ("L", "G0", "FMAX", "/")]
+    if ours != theirs:
+        found.append("words that are no axes have changed")
+    if not puts_back(call, pieces):
+        found.append("what was changed for the hole is not put back behind it")
+    return found
 
 
 def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> list[str]:

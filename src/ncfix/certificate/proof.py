@@ -20,7 +20,7 @@ from ncfix.certificate.expected import SLACK, WHOLE_TURN, parts
 from ncfix.certificate.findings import BlockFault, BlockProof
 from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, Given, positions, skips
 from ncfix.certificate.model import Mask, Ways
-from ncfix.certificate.pairing import LinePair, LinePairs, Pairing, text_faults
+from ncfix.certificate.pairing import LinePair, LinePairs, Pairing, hole_faults, text_faults
 from ncfix.certificate.reading import Family
 from ncfix.certificate.steps import AxisStep, Kind
 from ncfix.certificate.text import Indices, Text, same_but_axes
@@ -95,7 +95,8 @@ class Prover(Deviations):
     def paired(self) -> Pairing:
         """Which lines stand for which."""
         moves, nearness = self.ours.__contains__, (self.leads_there, self.lead_there)
-        pairing = Pairing(self.first, self.second, *nearness, moves, self.is_followed, self._is_foreign)
+        holes = ((), ()) if self.first.family is Family.WORDS else (self.calls, self.calls_there)
+        pairing = Pairing(self.first, self.second, *nearness, moves, self.is_followed, self._is_foreign, holes)
         pairing.run()
         return pairing
 
@@ -183,9 +184,20 @@ class Prover(Deviations):
         line = self.second.lines[pair.first].number
         if self._is_foreign(pair.row):
             return
-        timed = step is not None and step.feed_mode == 93
-        for text in text_faults(pairing, pair, arc, timed):
-            self.proof.fault(text, line, self.first.lines[pair.row].number)
+        number = self.first.lines[pair.row].number
+        call = self.calls.get(pair.row)
+        if call is not None and self.first.family is not Family.WORDS:
+            faults = hole_faults(pairing, pair, call)
+        else:
+            faults = text_faults(pairing, pair, arc, timed=step is not None and step.feed_mode == 93)
+        if call is not None:
+            its = [self.calls_there[at] for at in range(pair.first, pair.last + 1) if at in self.calls_there]
+            unit = float(self.ours.unit[self.ours.at[pair.row]])
+            digit = 1.1 * float(self.control_halves(unit).max()) / unit
+            if len(its) != 1 or not call.differs_in_depth_only(its[0], digit):
+                faults.append("the call of the cycle has changed by more than the depth of its hole")
+        for text in faults:
+            self.proof.fault(text, line, number)
 
     def _foreign_near(self, fault: BlockFault, pairing: Pairing) -> bool:
         """Whether what is wrong with lines may be due to what this reader does not know."""

@@ -162,6 +162,8 @@ def _word_address(number: int, text: str) -> TextLine:
     return line
 
 
+CYCLE_CALL = rf"CYCLE(?:8[1-9]|840)[ \t]*\([ \t]*(?:{NUMBER})?[ \t]*(?:,[ \t]*(?:{NUMBER})?[ \t]*)*\)"
+"""A drilling cycle of SINUMERIK with plain numbers."""
 JUMPS = "the program has loops, jumps or subprograms"
 RETRACTS = "M140 retracts the tool by a way that the control finds"
 CODE = r"[A-Z]{1,2}\d*"
@@ -208,7 +210,7 @@ def _sinumerik(number: int, text: str) -> TextLine:
                 line.odd = JUMPS
             elif re.match(r"[A-Z]\d", key):
                 line.odd = line.odd or f"{key!r} is no plain word"
-            elif "(" in key and not key.startswith("CYCLE800("):
+            elif "(" in key and not key.startswith("CYCLE800(") and not re.fullmatch(CYCLE_CALL, key):
                 line.odd = line.odd or f"{key.partition('(')[0].strip()} is not known to this reader"
         elif found[10] is not None and found[10] not in "/%:" and start >= marked:
             line.odd = line.odd or f"{_piece(text, start)!r} is no plain word"
@@ -225,8 +227,9 @@ KLARTEXT_WORD = re.compile(
 )
 KLARTEXT_LEAD = frozenset(("L", "LN", "C", "CC", "CP", "CR", "M", "STOP"))
 KLARTEXT_STATEMENT = re.compile(
-    r"(?:BEGIN|END) PGM\b|BLK FORM|TOOL (?:CALL|DEF)|LBL \d|LBL \"|M12[89]$|CYCL DEF (?:32|247)\b|FN ?[0-8]\b"
-    r"|Q[LRS]?\d+ ?=|PLANE (?:SPATIAL|RESET)\b|CYCL DEF (?:7|10)\.\d"
+    r"(?:BEGIN|END) PGM\b|BLK FORM|TOOL (?:CALL|DEF)|LBL \d|LBL \"|M12[89]$|FN ?[0-8]\b"
+    r"|CYCL DEF (?:32|247|20[0-35-79]|24[01])\b|Q[LRS]?\d+ ?=|PLANE (?:SPATIAL|RESET)\b|CYCL DEF (?:7|10)\.\d"
+    r"|CYCL CALL[ \t]*(?:;|$)"
     r"|FUNCTION (?:TCPM F (?:TCP|CONT) AXIS POS PATHCTRL (?:AXIS|VECTOR)|RESET TCPM)[ \t]*(?:;|$)"
 )
 """Blocks of Klartext that say something and lead no axis, as the follower knows them."""
