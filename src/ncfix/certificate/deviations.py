@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.certificate.expected import SLACK, Expected, PoseColumns
+from ncfix.certificate.holes import HoleCall
 from ncfix.certificate.model import LEVER, Array, Mask, Ways
 from ncfix.certificate.pairing import LinePair
 from ncfix.certificate.steps import AxisStep, Kind
@@ -63,6 +64,13 @@ class Moved(NamedTuple):
 
 class Deviations(Expected):
     """What ways are judged by."""
+
+    def calls_otherwise(self, pair: LinePair, call: HoleCall) -> bool:
+        """Whether the lines for a hole call its cycle in another way than to another depth, or not once."""
+        its = [self.calls_there[at] for at in range(pair.first, pair.last + 1) if at in self.calls_there]
+        unit = float(self.ours.unit[self.ours.at[pair.row]])
+        digit = 1.1 * float(self.control_halves(unit).max()) / unit
+        return len(its) != 1 or not call.differs_in_depth_only(its[0], digit)
 
     def gaps(self, meant: Array, done: Array, rows: NDArray[np.intp], given: PoseColumns) -> Array:
         """How far the tip is from where it is meant to be, mm; with play, on the better side of each axis."""

@@ -10,7 +10,6 @@ from ncfix.certificate.following import (
     CENTRES,
     INCH,
     NO_CENTRE,
-    PLANES,
     UNKNOWN_WORDS,
     AxisFollower,
     Given,
@@ -19,7 +18,7 @@ from ncfix.certificate.holes import HoleCall
 from ncfix.certificate.klartext import KlartextFollower
 from ncfix.certificate.model import TipModel
 from ncfix.certificate.reading import AXES, CYCLE_CALL, Family, TextLine, TextWord
-from ncfix.certificate.steps import NAN, AxisStep, Kind
+from ncfix.certificate.steps import NAN, PLANES, AxisStep, Kind
 from ncfix.certificate.turning import SwivelCall, turned
 
 QUIET = frozenset((51, 80, 90, 150, 501, 600, 610, 611, 620, 640, 800, 911, 960, 970, 980, 990)) | frozenset(
@@ -262,7 +261,7 @@ class WordAddressFollower(AxisFollower):
         if step.why:
             return step
         size = None if radius is None or radius.value is None else radius.value * self.unit
-        return self.circle(step, centre, self.clockwise, size)
+        return step.lead_round(self.axes, self.plane, centre, self.clockwise, size)
 
     def _modes(self, line: TextLine, codes: Sequence[int]) -> tuple[str, bool]:
         """Take in the codes of a block: why it has no motion that this reader knows, and whether it is in machine

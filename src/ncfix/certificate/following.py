@@ -24,7 +24,6 @@ from ncfix.certificate.turning import TurnedFrame
 from ncfix.values import frozen
 
 INCH = 25.4
-PLANES = {17: ("X", "Y", "Z"), 18: ("Z", "X", "Y"), 19: ("Y", "Z", "X")}
 CENTRES = {"X": "I", "Y": "J", "Z": "K"}
 
 
@@ -78,7 +77,7 @@ ROUND = 179.0
 """Degrees from which on the shorter way may be the other one: half a turn, less what a correction may be."""
 SQUARE = 2e-4
 """rad; rotary words have three decimals of a degree."""
-NO_POLE, NO_CENTRE, NO_CIRCLE = "the pole is not known", "an arc without a centre", "an arc that does not close"
+NO_POLE, NO_CENTRE = "the pole is not known", "an arc without a centre"
 
 
 class AxisFollower:
@@ -441,38 +440,6 @@ class AxisFollower:
         step.foreign |= bool(why)
         self.at = {**over, "Z": offset + unit * call.level}
         self.calls[row] = call
-        return step
-
-    def circle(self, step: AxisStep, centre: Mapping[str, float], clockwise: bool, radius: float | None) -> AxisStep:
-        """Give a step the circle that its words describe."""
-        one, two, up = PLANES[self.plane]
-        start = dict(zip(self.axes, step.start, strict=True))
-        end = dict(zip(self.axes, step.end, strict=True))
-        a, b = (start[one], start[two]), (end[one], end[two])
-        if radius is not None:
-            chord = math.dist(a, b)
-            height = radius * radius - chord * chord / 4
-            if not chord > 0 or height < -0.01 * radius * radius:
-                step.why = step.why or NO_CIRCLE
-                return step
-            side = math.sqrt(max(height, 0.0)) * (1 if (radius > 0) != clockwise else -1)
-            way = ((b[0] - a[0]) / chord, (b[1] - a[1]) / chord)
-            middle = ((a[0] + b[0]) / 2 - side * way[1], (a[1] + b[1]) / 2 + side * way[0])
-        else:
-            middle = (centre[one], centre[two])
-        sizes = math.dist(a, middle), math.dist(b, middle)
-        if abs(sizes[0] - sizes[1]) > 0.05 + 1e-3 * sizes[0]:
-            step.why = step.why or NO_CIRCLE
-        first = math.atan2(a[1] - middle[1], a[0] - middle[0])
-        last = math.atan2(b[1] - middle[1], b[0] - middle[0])
-        turn = (last - first) % (2 * math.pi)
-        if clockwise:
-            turn -= 2 * math.pi
-        if math.dist(a, b) < 1e-9 or abs(turn) < 1e-12:
-            turn = -2 * math.pi if clockwise else 2 * math.pi
-        places = {one: middle[0], two: middle[1], up: 0.0}
-        step.centre = (places["X"], places["Y"], places["Z"])
-        step.across, step.sweep, step.kind = up, turn, Kind.ARC
         return step
 
     def auxiliary(self, word: TextWord) -> None:

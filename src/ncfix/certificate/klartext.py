@@ -230,7 +230,7 @@ class KlartextFollower(AxisFollower):
             return self._arc_about_pole(step, turn, "DR-" in keys)
         radius = line.word("R")
         if radius is not None and radius.value is not None:
-            return self.circle(step, {}, "DR-" in keys, radius.value * self.unit)
+            return step.lead_round(self.axes, self.plane, {}, "DR-" in keys, radius.value * self.unit)
         step.why = "an arc without a radius"
         return step
 
@@ -247,7 +247,7 @@ class KlartextFollower(AxisFollower):
         if any(math.isnan(self.pole.get(axis, NAN)) for axis in "XY"):
             step.why = NO_POLE
             return step
-        step = self.circle(step, self.pole, clockwise, None)
+        step = step.lead_round(self.axes, self.plane, self.pole, clockwise, None)
         if turn is not None and turn.value is not None:
             step.sweep = math.radians(turn.value)
             step.why = step.why or ("a helix of more than a turn" if abs(turn.value) > 360.0 else "")

@@ -18,11 +18,11 @@ import numpy as np
 from ncfix.certificate.deviations import ASIDE, FEW, HALF_TURN, MANY, Deviations, Moved
 from ncfix.certificate.expected import SLACK, WHOLE_TURN, parts
 from ncfix.certificate.findings import BlockFault, BlockProof
-from ncfix.certificate.following import NO_CENTRE, NO_CIRCLE, NO_POLE, Given, positions, skips
+from ncfix.certificate.following import NO_CENTRE, NO_POLE, Given, positions, skips
 from ncfix.certificate.model import Mask, Ways
 from ncfix.certificate.pairing import LinePair, LinePairs, Pairing, hole_faults, text_faults
 from ncfix.certificate.reading import Family
-from ncfix.certificate.steps import AxisStep, Kind
+from ncfix.certificate.steps import NO_CIRCLE, AxisStep, Kind
 from ncfix.certificate.text import Indices, Text, same_but_axes
 from ncfix.machine import Machine
 
@@ -190,12 +190,8 @@ class Prover(Deviations):
             faults = hole_faults(pairing, pair, call)
         else:
             faults = text_faults(pairing, pair, arc, timed=step is not None and step.feed_mode == 93)
-        if call is not None:
-            its = [self.calls_there[at] for at in range(pair.first, pair.last + 1) if at in self.calls_there]
-            unit = float(self.ours.unit[self.ours.at[pair.row]])
-            digit = 1.1 * float(self.control_halves(unit).max()) / unit
-            if len(its) != 1 or not call.differs_in_depth_only(its[0], digit):
-                faults.append("the call of the cycle has changed by more than the depth of its hole")
+        if call is not None and self.calls_otherwise(pair, call):
+            faults.append("the call of the cycle has changed by more than the depth of its hole")
         for text in faults:
             self.proof.fault(text, line, number)
 
@@ -224,11 +220,8 @@ class Prover(Deviations):
             return step.why
         if step.kind == Kind.FIXED:
             if self._changed(pair):
-                self.proof.fault(
-                    "a motion in machine coordinates has changed",
-                    self.second.lines[pair.first].number,
-                    self.first.lines[pair.row].number,
-                )
+                line, number = self.second.lines[pair.first].number, self.first.lines[pair.row].number
+                self.proof.fault("a motion in machine coordinates has changed", line, number)
             else:
                 self.proof.proved += 1
                 self.proof.proved_motions += 1

@@ -15,6 +15,9 @@ from ncfix.certificate.text import KEPT, MOST_DIGITS, Indices, StraightLines
 from ncfix.values import mutable
 
 NAN = math.nan
+PLANES = {17: ("X", "Y", "Z"), 18: ("Z", "X", "Y"), 19: ("Y", "Z", "X")}
+"""The axes of a plane, and the one across it."""
+NO_CIRCLE = "an arc that does not close"
 AT_ONCE = 500
 """Steps that are put into columns together."""
 Floats = NDArray[np.float64]
@@ -69,6 +72,42 @@ class AxisStep:
     """The tool turns in a plane, not its axes at even rates."""
     turn: Floats | None = None
     """(3, 3), how the coordinates of the program are turned; None: they are not."""
+
+    def lead_round(
+        self, names: Sequence[str], plane: int, centre: Mapping[str, float], clockwise: bool, radius: float | None
+    ) -> AxisStep:
+        """Make it the arc in a plane (17, 18 or 19) about a centre, mm, or with a radius; `why` says if there is none.
+
+        names  the letters of the axes
+        """
+        one, two, up = PLANES[plane]
+        start, end = (dict(zip(names, places, strict=True)) for places in (self.start, self.end))
+        a, b = (start[one], start[two]), (end[one], end[two])
+        if radius is not None:
+            chord = math.dist(a, b)
+            height = radius * radius - chord * chord / 4
+            if not chord > 0 or height < -0.01 * radius * radius:
+                self.why = self.why or NO_CIRCLE
+                return self
+            side = math.sqrt(max(height, 0.0)) * (1 if (radius > 0) != clockwise else -1)
+            way = ((b[0] - a[0]) / chord, (b[1] - a[1]) / chord)
+            middle = ((a[0] + b[0]) / 2 - side * way[1], (a[1] + b[1]) / 2 + side * way[0])
+        else:
+            middle = (centre[one], centre[two])
+        sizes = math.dist(a, middle), math.dist(b, middle)
+        if abs(sizes[0] - sizes[1]) > 0.05 + 1e-3 * sizes[0]:
+            self.why = self.why or NO_CIRCLE
+        first = math.atan2(a[1] - middle[1], a[0] - middle[0])
+        last = math.atan2(b[1] - middle[1], b[0] - middle[0])
+        turn = (last - first) % (2 * math.pi)
+        if clockwise:
+            turn -= 2 * math.pi
+        if math.dist(a, b) < 1e-9 or abs(turn) < 1e-12:
+            turn = -2 * math.pi if clockwise else 2 * math.pi
+        places = {one: middle[0], two: middle[1], up: 0.0}
+        self.centre = (places["X"], places["Y"], places["Z"])
+        self.across, self.sweep, self.kind = up, turn, Kind.ARC
+        return self
 
 
 class ModesInForce(NamedTuple):
