@@ -109,7 +109,7 @@ def corrected(text: str, dialect: str, machine: Machine) -> Moves:
 def ends(moves: Moves, machine: Machine) -> NDArray[np.float64]:
     """Axis positions at the ends of the motions, mm and degrees."""
     rows = np.flatnonzero(moves.kind != MotionKind.DWELL)
-    lengths = np.nan_to_num(moves.tool_length[rows])
+    lengths = np.nan_to_num(moves.length_under_tcp[rows])
     q = joints_from_commands(placed(machine, SETUP), moves.end[rows], moves.tcp[rows], lengths)
     return np.where(machine.rotary, np.degrees(q), q)
 

@@ -50,6 +50,9 @@ EVENT = re.compile(
 )
 """What sets a pole, relies on one, or may lead elsewhere; other labels are passed through."""
 
+USES = re.compile(rb"(?im)^[ \t/\d]*(?:CP?|LP|CTP)(?![A-Z])|(?:APPR|DEP)[ \t]+P|CALL[ \t]+(?:PGM|SEL)|PGM[ \t]+CALL")
+"""What counts from a pole, and calls of other programs, which may: without any a text relies on none."""
+
 CALCULATION = re.compile(rb"(?i)FN[ \t]*(?!9|1[0-2])\d")
 LOOK = 80
 """Bytes of a line that tell what it is."""
@@ -267,7 +270,7 @@ def _events(source: bytes) -> tuple[list[int], list[bool]]:
     """Where a pole is set or something may rely on one, and which of the two it is."""
     places, relying = [], []
     text = b"\n" + in_lines(source)
-    for found in EVENT.finditer(text):
+    for found in EVENT.finditer(text) if USES.search(text) else ():
         line = text[found.start("what") : found.start("what") + LOOK]
         if CALCULATION.match(line) is None:
             places.append(found.start())

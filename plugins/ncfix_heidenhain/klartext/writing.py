@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ncfix.control.arcs import CLOCKWISE
 from ncfix.text.spelling import ROUNDED, Spelling, value_of
-from ncfix.text.tree import Literal, Program, Word
+from ncfix.text.tree import Program, Word
 from ncfix.writer.block import EXACT, BlockWriter
 from ncfix.writer.target import Target
 from ncfix_heidenhain.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text, is_relied_on, pole_in_force
@@ -254,13 +254,14 @@ class KlartextWriter(BlockWriter):
 
     def _as_written(self, begin: FloatArray, end: FloatArray, *, own: bool) -> FloatArray:
         """An end on the digits that will be written; `own`: by the words of the block itself."""
-        result, decimals, values = end.tolist(), self.target.decimals.tolist(), self.program.values_of(self.block)
+        result, decimals = end.tolist(), self.target.decimals.tolist()
         for column, letter in self.columns:
             word = self.layout.axes.get(letter) if own else None
-            base = float(begin[column]) if word is not None and word.address in self.layout.forms else 0.0
+            increment = word is not None and word.address in self.layout.forms
+            base = float(begin[column]) if increment else 0.0
             result[column] = base + round(result[column] - base, decimals[column])
-            if word is not None and isinstance(word.value, Literal):
-                original = base + float(values[word.value.slot])
+            if word is not None:
+                original = base + self._value(word, self._meant(column, word, increment=increment))
                 if abs(result[column] - original) < self.half[column]:
                     result[column] = original
         return np.array(result)

@@ -104,7 +104,13 @@ def test_increments_of_parameters_say_the_same_from_a_corrected_place() -> None:
     ],
 )
 def test_what_relies_on_a_pole(text: str, relied_on: bool) -> None:
-    assert is_relied_on(("CR X+1 R5 DR+\n" + text).encode(), 12) == relied_on
+    assert is_relied_on(("LP PA+3\nCR X+1 R5 DR+\n" + text).encode(), 20) == relied_on
+
+
+@pytest.mark.parametrize("text", ["LBL 0\n", "CALL LBL 3\n", "FN 9: IF +1 EQU +1 GOTO LBL 5\nCT X+1\nCYCL CALL\n"])
+def test_where_nothing_counts_from_a_pole_none_is_relied_on(text: str) -> None:
+    assert not is_relied_on(("CR X+1 R5 DR+\n" + text).encode(), 12)
+    assert is_relied_on(("CR X+1 R5 DR+\n" + text + "CALL PGM OTHER").encode(), 12)
 
 
 @pytest.mark.parametrize(

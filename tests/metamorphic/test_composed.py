@@ -1,0 +1,76 @@
+"""Features of a dialect composed at random: the path of a program in plain words is corrected alike.
+
+`NCFIX_PAIRS=500` takes many compositions; a usual run a few of each dialect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from metamorphic.composed_iso import IsoAuthor
+from metamorphic.composed_klartext import KlartextAuthor
+from metamorphic.composed_siemens import SiemensAuthor
+from metamorphic.composing import COMPOSED, Author, Composition, compose, corrected, difference, shrunk
+from metamorphic.harness import OPTIONS, PAIRS
+from ncfix.machine import load
+
+AUTHORS: dict[str, type[Author]] = {
+    **dict.fromkeys(("iso", "linuxcnc", "fanuc", "haas", "mitsubishi"), IsoAuthor),
+    "siemens": SiemensAuthor,
+    "heidenhain": KlartextAuthor,
+}
+REFUSALS = (
+    "executed from several states",
+    "a refused arc that follows",
+    "never goes through them",
+    "time that takes is not known",
+    "the arc needs a pole of its own",
+    "beyond its range",
+    "over which its errors are known",
+)
+"""Documented: calls from several states without --flatten, turns alone in programs of two units, poles, travel."""
+
+
+@pytest.mark.parametrize("dialect", AUTHORS)
+def test_a_composition_is_corrected_as_its_path(dialect: str, root: Path, figures: Callable[[str], None]) -> None:
+    machines = [load(str(root / f"examples/machines/{name}.toml")) for name in ("wCAYFXZSt", "wCBXFZYSt")]
+    for seed in range(PAIRS):
+        made = compose(AUTHORS[dialect], dialect, machines, seed)
+        if difference(made, REFUSALS):
+            least = shrunk(made, lambda each: difference(each, REFUSALS))
+            plain, wild = (least.written(wild=wild).text for wild in (False, True))
+            pytest.fail(f"seed {seed}: {difference(least, REFUSALS)}\n{plain}\n{wild}\n{least.options}")
+    figures(f"composed, {dialect}: {PAIRS} compositions, no difference")
+
+
+FOUND = {
+    "arc to a computed increment": """BEGIN PGM R MM
+TOOL CALL 1 Z
+L X-24.680000 Y-24.733 Z12.981 A+0.000000 C+0.000000 FMAX
+CC X-21.630120 Y-27.432922
+FN 1: Q10 = -3.954520 + +3
+C IXQ10 IY-1.954185 DR- F500
+M30
+END PGM R MM
+""",
+    "CR in a subprogram, and no pole anywhere": """BEGIN PGM R MM
+TOOL CALL 1 Z
+CALL LBL 1
+M30
+LBL 1
+L X-32.600000 Y+0.000000 Z+56.500000 A+0 C+0.000000 FMAX
+CR X-39.190505 Y+16.423307 R+9.3780463 DR+ F500
+LBL 0
+END PGM R MM
+""",
+}
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_what_compositions_have_found(name: str, root: Path) -> None:
+    machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
+    made = Composition(KlartextAuthor, "heidenhain", machine, COMPOSED, OPTIONS, ())
+    assert not corrected(FOUND[name], made).refused
