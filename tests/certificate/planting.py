@@ -416,7 +416,7 @@ def wrong_cycle(draft: Draft) -> bool:
     text, line = found[0], draft.lines[at]
     where = draft.rng.choice([k for k, c in enumerate(text) if c.isdigit()])
     other = text[:where] + draft.rng.choice([c for c in "0123456789" if c != text[where]]) + text[where + 1 :]
-    if abs(float(other) - float(text)) < STEP / 2:
+    if abs(float(other) - float(text)) < 1.5 * STEP:  # where a cycle starts follows its hole to a digit
         return False
     draft.lines[at] = line[: found.start()] + other + line[found.end() :]
     return True

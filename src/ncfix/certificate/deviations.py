@@ -13,6 +13,7 @@ from ncfix.certificate.expected import SLACK, Expected, PoseColumns
 from ncfix.certificate.holes import HoleCall
 from ncfix.certificate.model import LEVER, Array, Mask, Ways
 from ncfix.certificate.pairing import LinePair
+from ncfix.certificate.reading import Family
 from ncfix.certificate.steps import AxisStep, Kind
 from ncfix.certificate.text import Indices
 
@@ -69,8 +70,10 @@ class Deviations(Expected):
         """Whether the lines for a hole call its cycle in another way than to another depth, or not once."""
         its = [self.calls_there[at] for at in range(pair.first, pair.last + 1) if at in self.calls_there]
         unit = float(self.ours.unit[self.ours.at[pair.row]])
-        digit = 1.1 * float(self.control_halves(unit).max()) / unit
-        return len(its) != 1 or not call.differs_in_depth_only(its[0], digit)
+        most = 2.1 * float(self.control_halves(unit).max())  # both numbers are rounded
+        if self.first.family is Family.WORDS:
+            most += self.tolerance  # where a hole begins (R) cuts nothing
+        return len(its) != 1 or not call.differs_in_depth_only(its[0], most / unit)
 
     def gaps(self, meant: Array, done: Array, rows: NDArray[np.intp], given: PoseColumns) -> Array:
         """How far the tip is from where it is meant to be, mm; with play, on the better side of each axis."""

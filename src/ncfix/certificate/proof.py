@@ -62,7 +62,10 @@ def prove(
         prover, *others = (Prover(first, second, machine, each, tolerance_um) for each in settings)
         pairing = prover.paired()
         for each in others:
-            prover.begin_apart |= {row for row in each.ours if prover.ours[row].start != each.ours[row].start}
+            steps = ((row, prover.ours[row], each.ours[row]) for row in each.ours)
+            prover.begin_apart |= {
+                row for row, one, other in steps if (one.start, one.said) != (other.start, other.said)
+            }
         proof = prover.run(pairing)
         for each in others:
             each.begin_apart = prover.begin_apart
