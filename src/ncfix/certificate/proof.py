@@ -305,8 +305,7 @@ class Prover(Deviations):
         if self.machine.depends_on_direction:
             whole &= self.one_sided[moved.ours]
         kind, pieces = self.ours.kind[moved.ours][moved.owner], theirs.kind[moved.pieces]
-        other = (pieces != kind) & ~((kind == Kind.ARC) & (pieces == Kind.FEED))
-        whole[moved.owner[other]] = False
+        whole[moved.owner[(pieces != kind) & ~((kind == Kind.ARC) & (pieces == Kind.FEED))]] = False
         found: Mask = whole
         return found
 
@@ -427,9 +426,8 @@ class Prover(Deviations):
         self.proof.proved += len(moved.row)
         self.proof.proved_motions += len(moved.row)
         kinds = self.ours.kind[moved.ours]
-        known = np.isfinite(self.ours.start[moved.ours]).all(axis=1) & np.isfinite(self.theirs.start[moved.begin]).all(
-            axis=1
-        )
+        known = np.isfinite(self.ours.start[moved.ours]).all(axis=1)
+        known &= np.isfinite(self.theirs.start[moved.begin]).all(axis=1)
         cutting = moved.where(known & ((kinds == Kind.FEED) | (kinds == Kind.ARC)))
         if not len(cutting.row) or self.model is None:
             return
