@@ -298,7 +298,7 @@ TOOL_MEASURED = "NCF281"
 LENGTH_MEASURED = "TCH PROBE {} measures the tool, and its length in the setup is taken to be what the control finds"
 
 OTHER_POINT = "FUNCTION TCPM with a reference point other than the tip"
-SELECTED = "PRESET SELECT with words of its own, or while coordinates are transformed, is not followed"
+SELECTED = "PRESET SELECT by a parameter, with other words, or while coordinates are transformed, is not followed"
 ERROR = "NCF278"
 PROBED = range(100, 200)
 """The Q parameters in which probing cycles and the control itself leave results."""
@@ -396,9 +396,12 @@ def is_untransformed(control: KlartextControl) -> bool:
 
 
 def select_preset(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
-    """PRESET SELECT: a row of the preset table; it ends transformations, unless it is told to keep some."""
+    """PRESET SELECT: a row of the preset table; it ends transformations, unless it is told to keep some.
+
+    A row that a parameter says (#Q1) is not followed.
+    """
     control.resume(PRESET)
-    if match["rest"].strip() or control.doubtful or not is_untransformed(control):
+    if match["row"] is None or match["rest"].strip() or control.doubtful or not is_untransformed(control):
         control.suspend(PRESET, SELECTED)
         return
     control.load_preset(f"PRESET{int(match['row'])}")
@@ -429,7 +432,7 @@ FORMS: tuple[tuple[str, Do], ...] = (
     (r"FN\s*(18|2[0348])\b.*", read_values),
     (r"(PATTERN\s+DEF|SEL\s+PATTERN).*", holes),
     (r"TRANS\b.*", lambda control, _, match: trans(control, match[0])),
-    (r"PRESET\s+SELECT\s+#\s*(?P<row>\d+)(?P<rest>.*)", select_preset),
+    (r"PRESET\s+SELECT\b(\s*#\s*(?P<row>\d+)\b)?(?P<rest>.*)", select_preset),
     (r"FUNCTION\s+(?P<reset>RESET\s+)?TCPM\b(?P<rest>.*)", tcpm),
     # FUNCTION statements that leave coordinates as they are; others (turning, parallel axes, corrections, another
     # kinematic model by MODE MILL) may not.

@@ -132,7 +132,8 @@ def test_a_row_of_the_preset_table_by_its_function() -> None:
     assert ends("PRESET SELECT #1\nL X+1 Y+1 Z+1 FMAX") == ends("CYCL DEF 247 P Q339=+1\nL X+1 Y+1 Z+1 FMAX")
     tilted = "CYCL DEF 10.0 R\nCYCL DEF 10.1 ROT+5\nPRESET SELECT #1\nL X+1 Y+1 Z+1 FMAX"
     assert "PRESET SELECT" in fates(tilted)[-1][1]
-    assert "PRESET SELECT" in fates("PRESET SELECT #1 KEEP TRANS\nL X+1 Y+1 Z+1 FMAX")[-1][1]
+    for row in ("#1 KEEP TRANS", "#Q1"):
+        assert "PRESET SELECT" in fates(f"PRESET SELECT {row}\nL X+1 Y+1 Z+1 FMAX")[-1][1]
 
 
 SUB = "BEGIN PGM S MM\nL X+5 FMAX\nEND PGM S MM\n"
