@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask, lengths, owners, picked, stacked, taken
+from ncfix.compensate.plan.arrays import Array, Index, Mask, lengths, owners, picked, stacked, taken, vector_product
 from ncfix.compensate.plan.intent import Intent, correctable
 from ncfix.compensate.plan.sampling import interior
 from ncfix.compensate.plan.segments import Segments
@@ -86,12 +86,12 @@ class ContactPath:
         """The way in the plane at points (k, 3) of the motions, unit vectors."""
         straight = _flat(self.end - self.start, self.up)
         spoke = _flat(points - self.centre, self.up)
-        way = np.where(self.arc[:, None], self.turn[:, None] * np.cross(self.up, spoke), straight)
+        way = np.where(self.arc[:, None], self.turn[:, None] * vector_product(self.up, spoke), straight)
         return _unit(way)
 
     def left(self, points: Array) -> Array:
         """The way to the left at points (k, 3) of the motions, unit vectors in the plane."""
-        return np.cross(self.up, self.heading(points))
+        return vector_product(self.up, self.heading(points))
 
     def beside(self, points: Array, way: Array) -> Array:
         """Where the tool is, (k, 3), gone on by `way` (k,) mm in the plane from beside points of the motions."""
@@ -100,7 +100,7 @@ class ContactPath:
         spoke = _flat(here - self.centre, self.up)
         size = np.maximum(lengths(spoke), NO_WAY)
         angle = (self.turn * way / size)[:, None]
-        turned = np.cos(angle) * spoke + np.sin(angle) * np.cross(self.up, spoke)
+        turned = np.cos(angle) * spoke + np.sin(angle) * vector_product(self.up, spoke)
         return np.where(self.arc[:, None], here - spoke + turned, straight)
 
     def beside_heading(self, at: Array) -> Array:
@@ -109,7 +109,7 @@ class ContactPath:
         sign = self.turn * np.sign(
             1 - self.turn * self.radius / np.maximum(lengths(_flat(self.end - self.centre, self.up)), NO_WAY)
         )
-        way = np.where(self.arc[:, None], sign[:, None] * np.cross(self.up, spoke), self.heading(self.end))
+        way = np.where(self.arc[:, None], sign[:, None] * vector_product(self.up, spoke), self.heading(self.end))
         return _unit(way)
 
 
@@ -193,7 +193,7 @@ def _at_corners(
     ones = np.ones(len(rows))
     ends = [each.at(rows, ones) for each in (intent.segments, real)]
     ways = first.heading(first.end), second.heading(second.start)
-    turn = np.arctan2(_dot(np.cross(ways[0], ways[1]), first.up), _dot(ways[0], ways[1]))
+    turn = np.arctan2(_dot(vector_product(ways[0], ways[1]), first.up), _dot(ways[0], ways[1]))
     inner, sharp = turn * first.radius > 0, np.abs(turn) >= SMOOTH
     half = np.maximum(np.cos(turn / 2), SHARPEST)
     shortest = np.minimum(lengths(first.end - first.start), lengths(second.end - second.start))
@@ -223,12 +223,12 @@ def _at_corners(
             break
         angle = (turn * np.where(leads_in, 1.0, share))[round_, None]
         left, up = first.left(first.end)[round_], first.up[round_]
-        way = np.cos(angle) * left + np.sin(angle) * np.cross(up, left)
+        way = np.cos(angle) * left + np.sin(angle) * vector_product(up, left)
         places = [end[round_].copy() for end in ends]
         for place in places:
             place[:, intent.columns] += first.radius[round_, None] * way
         before, after = _gaps(intent, rows[round_], ones[round_], *places)
-        tangent = _in_tip(intent, rows[round_], places[0], np.cross(way, up))
+        tangent = _in_tip(intent, rows[round_], places[0], vector_product(way, up))
         sizes = _across(before, tangent), _across(after, tangent)
         found.append(OffsetPoints(rows[round_], *sizes, sharp[round_], np.full(len(round_), 3**0.5)))
     return found
@@ -246,10 +246,10 @@ def _meeting(one: ContactPath, other: ContactPath, turn: Array) -> tuple[Array, 
         here, there = one.beside(one.end, back), other.beside(other.start, on)
         miss = _flat(there - here, one.up)
         a, b = one.beside_heading(here), other.beside_heading(there)
-        across = _dot(np.cross(a, b), one.up)
+        across = _dot(vector_product(a, b), one.up)
         safe = np.where(np.abs(across) < 1e-6, 1.0, across)
-        back = back + np.where(smooth, 0.0, _dot(np.cross(miss, b), one.up) / safe)
-        on = on + np.where(smooth, 0.0, _dot(np.cross(miss, a), one.up) / safe)
+        back = back + np.where(smooth, 0.0, _dot(vector_product(miss, b), one.up) / safe)
+        on = on + np.where(smooth, 0.0, _dot(vector_product(miss, a), one.up) / safe)
         back, on = np.clip(back, -most, most), np.clip(on, -most, most)
     here, there = one.beside(one.end, back), other.beside(other.start, on)
     arrived = lengths(_flat(there - here, one.up)) < MET

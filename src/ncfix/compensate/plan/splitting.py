@@ -41,6 +41,7 @@ from ncfix.compensate.plan.arrays import (
     ranges,
     stacked,
     sums,
+    vector_product,
 )
 from ncfix.compensate.plan.ends import as_commands, path_of, with_rotary_held
 from ncfix.compensate.plan.intent import Intent
@@ -257,7 +258,7 @@ class RoundGrid:
         chord = across(ends[1] - ends[0], normal)
         length = np.linalg.norm(chord, axis=1)
         arc = (length >= SHORTEST) & (np.abs(turn) <= WIDEST) & (length < JUMP * self.radius[first] * np.abs(turn))
-        way = np.cross(normal, chord) / np.maximum(length, 1e-300)[:, None]
+        way = vector_product(normal, chord) / np.maximum(length, 1e-300)[:, None]
         height = length / 2 / np.tan(np.where(arc, turn, 1.0) / 2)
         pieces = _on_bisector(Segments(start, end, arc, ends[0], normal, turn, self.columns), way, height)
         here = pieces.at(piece, share)
