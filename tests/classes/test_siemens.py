@@ -87,7 +87,7 @@ FRAMES = [
     case("MIRROR", "MIRROR X0\nG1 X5 F100\nG2 X15 Y2 CR=5", L4=R, L5=R),
     case("SCALE alike", "SCALE X2 Y2 Z2\nG1 X5 Y6 Z7 F100", L4=R),
     case("SCALE of one axis", "SCALE X2\nG1 X5 F100\nSCALE\nX7 Y7 Z7", L4=N, L6=N),
-    case("a frame that only the control knows", "TRANS X=$AA_IW[X]\nG1 X5 F100\nTRANS\nG0 X1 Y1 Z50", L4=N, L6=N),
+    case("a frame that only the control knows", "TRANS X=$AA_IW[X]\nG1 X5 F100\nTRANS\nG0 X1 Y1 Z50", L4=N, L6=R),
     case("limits of the working area", "G25 X-100 Y-100\nG26 X100 Y100 S900\nG1 X5 F100", L5=R),
     case("SUPA", "SUPA G0 Z0\nG0 X5 Y5 Z20", L3=P, L4=R),
     case("G53 and G153", "G53 G0 Z0\nG153 Z1\nG0 X5 Y5 Z20", L3=P, L4=P, L5=R),

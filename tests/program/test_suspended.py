@@ -26,6 +26,9 @@ MOTIONS = {
     [
         ("siemens", "SCALE X2", "SCALE"),
         ("siemens", "ROTS X10 Y20", "ROT"),
+        ("siemens", "R1=$AA_IM[X]\nROT Z=R1", "TRANS"),
+        ("siemens", "R1=$AA_IM[X]\nATRANS X=R1", "ROT"),
+        ("siemens", 'R1=$AA_IM[X]\nCYCLE800(0,"T",200000,57,0,0,0,R1,0,0,0,0,0,-1)', "CYCLE800()"),
         ("heidenhain", "CYCL DEF 10.0 R\nCYCL DEF 10.1 ROT+Q150", "CYCL DEF 10.0 R\nCYCL DEF 10.1 ROT+0"),
         ("heidenhain", "CYCL DEF 26.0 S\nCYCL DEF 26.1 X1.4 Y0.6", "CYCL DEF 26.0 S\nCYCL DEF 26.1 X1 Y1"),
         ("heidenhain", "CYCL DEF 247 D Q339=+Q150", "CYCL DEF 247 D Q339=+1"),

@@ -44,10 +44,13 @@ PLANE_LENGTH = (
 
 
 def programmable(control: Sinumerik, name: str, words: BlockWordValues) -> None:
-    """TRANS, ROT, SCALE, MIRROR and, with A before them, what is added to what is in force."""
+    """TRANS, ROT, SCALE, MIRROR and, with A before them, what is added to what is in force.
+
+    One without A ends all that was in force, so one that is known only at run time counts up to the next of these.
+    """
     kind = name.removeprefix("a") if name.startswith("a") else name
     if any(value is None for value in words.values.values()):
-        control.refuse_rest(FRAME_AT_RUNTIME.format(name.upper()))
+        control.suspend("frame", FRAME_AT_RUNTIME.format(name.upper()))
         return
     frame, fault = FRAMES[kind](control, words)
     if fault:

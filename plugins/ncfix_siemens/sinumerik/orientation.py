@@ -252,7 +252,8 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
     values = [number(value(control)) for value in step.arguments]
     written = zip(values, step.written, strict=True)
     if any(value is None and part is not None and not isinstance(part, StringLiteral) for value, part in written):
-        control.refuse_rest("a tilted plane (CYCLE800) is known only at run time")
+        control.suspend("tilt", "a tilted plane (CYCLE800) is known only at run time")
+        control.lose_all(AFTER_SWIVEL)
         return
     plane = SwivelPlane.of([value or 0.0 for value in values] + [0.0] * 16, control.modal.unit)
     if plane.fault:
