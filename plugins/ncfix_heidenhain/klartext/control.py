@@ -103,8 +103,6 @@ class KlartextControl(base.ProgramControl):
     """A TNC: its transformations, Q parameters, path functions and cycles.
 
     plane_tilted  PLANE or cycle 19 has tilted the plane
-    tilts         some block of the program, or of the parts of it up to here, does: where rotary axes stand is what the
-                  control works out, so they get no words where the program has none
     turn          rotation in the working plane (cycle 10), degrees
     doubtful      why the transformations in force are not sure; empty while they are
     functions     the transformations that a TRANS function has set, and no cycle
@@ -114,7 +112,7 @@ class KlartextControl(base.ProgramControl):
 
     def __init__(self, run: Run, dialect: Dialect) -> None:
         super().__init__(run, dialect)
-        self.plane_tilted = self.tilts = False
+        self.plane_tilted = False
         self.turn = 0.0
         self.doubtful = ""
         self.functions: frozenset[str] = frozenset()
@@ -233,15 +231,6 @@ class KlartextControl(base.ProgramControl):
         own = motion.axes | (1 << Z if motion.code == BY_DEPTH else 0)
         machine = motion.passing is not None and motion.passing.rule is Pass.MACHINE_COORDINATES
         return 0 if self.modal.incremental or machine else own
-
-    def _resting(self, motion: Motion) -> int:
-        turning = self.unsure_turning
-        return super()._resting(motion) | (0 if motion.axes & turning else turning)
-
-    @property
-    def unsure_turning(self) -> int:
-        """Rotary axes that must not get a word in a block which names none of them."""
-        return mask_of(self.turning) if self.tilts else 0
 
     def is_led(self, unknown: UnknownAxes) -> bool:
         """What is not known is so because the control itself has led the axes somewhere."""

@@ -26,7 +26,7 @@ from ncfix_heidenhain.klartext.arcs import Step, circular, circular_by_radius, c
 from ncfix_heidenhain.klartext.blocks import unread_line
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.lane import run_lane
-from ncfix_heidenhain.klartext.layout import CORNERS, TURN_DEGREES, axis_numbers, poles_move, tilts
+from ncfix_heidenhain.klartext.layout import CORNERS, TURN_DEGREES, axis_numbers, poles_move
 from ncfix_heidenhain.klartext.lines import straight, straight_polar
 from ncfix_heidenhain.klartext.plans import CARTESIAN, MOVING, POLAR, VECTOR, KlartextPlan
 from ncfix_heidenhain.klartext.statements import (
@@ -159,7 +159,6 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             raise SourceError.of(fault.code, fault.text, control.locate(), fault.hint) from None
         self.flow = KlartextFlow(control, self.main, self.find)
         control.locate = self.place
-        control.tilts = tilts(program.source)
         control.modal.unit, control.unit_said = self.main.mm, True
         control.recompose()
 
@@ -368,7 +367,6 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         """See `Interpreter`: the writing of a block goes by the manner of numbers, and poles, elsewhere in the text."""
         self._check_manner(program.source)
         self._check_poles(program)
-        self.control.tilts |= tilts(program.source)
 
     def _check_manner(self, source: bytes) -> None:
         """Raise `NotInPartsError` where numbers have points and commas."""

@@ -152,11 +152,8 @@ def take(control: KlartextControl, stage: KlartextBlockRows, unit: KlartextUnit,
         styles = styles_of(control, stage.motion[moving], stage.side[moving], (unit.lanes.arc == "cp")[shapes[moving]])
         control.places.begun = True
         sided = stage.side[moving] != 0
-        turning = control.unsure_turning
-        if sided.any() or turning:
-            resting = np.where(sided, control.resting_of_many(mask, starts, ends), 0)
-            resting |= np.where(mask & turning, 0, turning)
-            control.builder.many_rest(resting)
+        if sided.any():
+            control.builder.many_rest(np.where(sided, control.resting_of_many(mask, starts, ends), 0))
         plane = control.plane_axes
         unplaced = control.places.unplaced | np.where(sided & (mask & plane == 0), plane, 0)
         control.builder.circles(circles._replace(row=np.searchsorted(moving, circles.row)))
