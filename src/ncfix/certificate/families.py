@@ -50,9 +50,10 @@ class WordAddressFollower(AxisFollower):
         """What one line does; None if it moves nothing."""
         if line.plain and line.path and not self.lost and self.modal_call is None and self._leads_straight(line):
             return self.straight(row, line)
-        cycle = next((word.name for word in line.codes if re.fullmatch(CYCLE_CALL, word.name)), "")
-        if cycle:
-            return self._call(row, line, cycle)
+        if self.family is Family.SINUMERIK:
+            for word in line.codes:
+                if re.fullmatch(CYCLE_CALL, word.name):
+                    return self._call(row, line, word.name)
         codes = [round(10 * word.value) for word in line.codes if word.name == "G" and word.value is not None]
         if line.odd and (codes or line.path):
             self.lost["odd"] = line.odd
@@ -457,8 +458,9 @@ class WordAddressFollower(AxisFollower):
             # before G98 or G99 the control has its own way back
             back = NAN if self.returns_to_level is None else self.before_cycle
         if not step.why and not math.isnan(level):
-            zero, ends = self.offset("Z"), bottom["Z"]
-            self.calls[row] = HoleCall("", ((level - zero) / self.unit,), {0: 1}, (ends - zero) / self.unit, back)
+            zero = self.offset("Z")
+            begin, deep, after = ((place - zero) / self.unit for place in (level, bottom["Z"], back))
+            self.calls[row] = HoleCall("", (begin,), {0: 1}, deep, after)
         self.at = {**bottom, "Z": back}
         self.said["Z"] = self.said_before or back != self.before_cycle
         return step

@@ -118,7 +118,7 @@ class AxisFollower:
         self.before_cycle, self.said_before = NAN, False
         """Where Z stood before the cycles, and whether the program has brought it there."""
         self.calls: dict[int, HoleCall] = {}
-        """The cycles of holes that are called and not written in full, by their lines."""
+        """The drilling cycles of holes, by their lines."""
         self.modal_call: HoleCall | None = None
         """MCALL: the cycle that follows each motion."""
         self.pole: dict[str, float] = {}

@@ -20,8 +20,8 @@ RTP, RFP, DP, DPR = 0, 1, 3, 4
 deep the hole is."""
 KNOWN = {81: 6, 82: 6, 83: 12, 84: 12, 85: 8, 86: 11, 87: 6, 88: 7, 89: 6, 840: 11}
 """How many arguments change neither the axis of the hole nor what its depth means."""
-FIRST_DEPTH = {83: (5, 6)}
-"""Where a cycle says how deep it goes first, as a place and as a way."""
+FIRST_DEPTH = {83: {5: 1, 6: -1}}
+"""Where a cycle says how deep it goes first, as a place, which rises with the bottom, and as a way, which falls."""
 ADDED = re.compile(rf"FN ?([12]): ?(Q203) ?= ?\+?\2 ?([+-]) ?({DECIMAL})", re.IGNORECASE)
 ASSIGNED = re.compile(rf"(?<!\w)(Q\d+) ?= ?(?:({DECIMAL})(?=[ \t]*(?:~|$|Q\d+ ?=)))?", re.IGNORECASE)
 """A Q parameter that gets a value, and that value if it is a plain number."""
@@ -37,7 +37,7 @@ NOTHING = re.compile(r"[ \t]*/?\d?[ \t]*(?:N[ \t]*\d+)?[ \t]*(?:;.*)?", re.IGNOR
 class HoleCall(NamedTuple):
     """A drilling cycle with plain numbers, in units of the program.
 
-    values  arguments, or Q200, Q201, Q203 and Q204
+    values  arguments, or Q200, Q201, Q203 and Q204; of word addresses R
     depths  which of them a correction changes, and whether they rise (1) or fall (-1) with the bottom
     bottom  where the hole ends; NaN: not known
     level   where the tool stands after it
@@ -63,13 +63,9 @@ class HoleCall(NamedTuple):
         if way and reference is not None:
             deep = reference - way if clear >= reference else reference + way
         assert deep is not None
-        place, length = FIRST_DEPTH.get(number, (DP, DPR))
-        said = [(place, 1), (length, -1), (DP, 1), (DPR, -1)]
-        depths = {
-            at: sense
-            for at, sense in said
-            if at < len(values) and (values[at] if sense < 0 else values[at] is not None)
-        }
+        said = {DP: 1, DPR: -1} | FIRST_DEPTH.get(number, {})  # a way of zero is none
+        given = {at: values[at] for at in said if at < len(values)}
+        depths = {at: said[at] for at, value in given.items() if value is not None and (value or said[at] > 0)}
         return cls(name.strip(), values, depths, deep, clear)
 
     @classmethod
@@ -82,13 +78,15 @@ class HoleCall(NamedTuple):
         return cls(str(number), values, {2: 1}, surface + deep, surface + max(gap, second))
 
     def differs_in_depth_only(self, other: HoleCall, digit: float) -> bool:
-        """Whether another call makes the same hole, up to its depth, which all arguments follow to a digit."""
+        """Whether another call makes the same hole up to its depth: what changes follows that to a digit."""
         if self.name != other.name or len(self.values) != len(other.values):
             return False
         risen = other.bottom - self.bottom
         for place, (mine, its) in enumerate(zip(self.values, other.values, strict=True)):
-            follows = risen * self.depths.get(place, 0)
-            if mine != its and (mine is None or its is None or not abs(its - mine - follows) <= digit or not follows):
+            sense = self.depths.get(place, 0)
+            if mine == its:
+                continue
+            if mine is None or its is None or not sense or not abs(its - mine - sense * risen) <= digit:
                 return False
         return True
 

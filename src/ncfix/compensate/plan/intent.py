@@ -111,12 +111,16 @@ class Intent:
 
     def joints_at(self, rows: Index, fraction: Array) -> Array:
         """Axis positions of a perfect control at fractions of motions."""
-        if len(rows) and self.moves.tcp.any():
+        if self._tcp and len(rows):
             if (fraction == 1).all():
                 return picked(self.ends[1], rows)
             if (fraction == 0).all():
                 return picked(self.ends[0], rows)
         return self.joints(rows, self.segments.at(rows, fraction))
+
+    @cached_property
+    def _tcp(self) -> bool:
+        return bool(self.moves.tcp.any())
 
     @cached_property
     def ends(self) -> tuple[Array, Array]:
