@@ -15,10 +15,8 @@ import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from lark import Token
-
 from ncfix.control.coordinates import LETTERS
-from ncfix.text.build import Branch, Node, Parsed, TreeBuilder, check_exponents, check_numbers, edges, kind
+from ncfix.text.build import Parsed, TreeBuilder, check_exponents, check_numbers, edges, is_token, kind
 from ncfix.text.dialect import Dialect
 from ncfix.text.grammar import squeeze
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
@@ -28,9 +26,11 @@ from ncfix_iso.rs274.language import check_repeats, parsed_words
 from ncfix_iso.rs274.order import DWELL
 
 if TYPE_CHECKING:
+    from lark import Token
+
+    from ncfix.text.build import Branch, Node
     from ncfix_fanuc.macro.control import MacroControl
     from ncfix_iso.rs274.plans import Codes, RS274Plan
-
 
 G15, G16 = 150, 160
 SCALED = frozenset("XYZABCUVWIJKRQ")
@@ -110,15 +110,15 @@ class MacroBuilder(TreeBuilder):
 
     def item(self, node: Node) -> Item:
         """One item of a block."""
-        if isinstance(node, Token) or kind(node) not in STATEMENTS:
+        if is_token(node) or kind(node) not in STATEMENTS:
             return super().item(node)
         return self.statement(node, STATEMENTS[kind(node)])
 
     def statement(self, tree: Branch, keyword: str) -> OWordLine:
         """A control statement: what it tests, and where it leads."""
-        branches = [node for node in tree.children if not isinstance(node, Token)]
+        branches = [node for node in tree.children if not is_token(node)]
         label: str | Expression = next(
-            (str(int(str(n))) for n in tree.children if isinstance(n, Token) and kind(n) == "LABEL"), ""
+            (str(int(str(n))) for n in tree.children if is_token(n) and kind(n) == "LABEL"), ""
         )
         tests = branches[:1] if keyword in ("if goto", "if then", "do") else []
         if not label and len(branches) > len(tests):

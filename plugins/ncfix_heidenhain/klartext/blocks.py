@@ -10,16 +10,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
-from lark import Token, UnexpectedInput
 from numpy.typing import NDArray
 
 from ncfix import core
 from ncfix.control.expressions import Fault, Unknown
-from ncfix.text.build import MAX_DEPTH, Branch, Node, Parsed, TooDeepError, TreeBuilder, edges, kind, tokens_of
+from ncfix.text.build import MAX_DEPTH, Parsed, TooDeepError, TreeBuilder, edges, is_token, kind, tokens_of
 from ncfix.text.dialect import Dialect
-from ncfix.text.grammar import UnspacedBlock, parse
+from ncfix.text.grammar import UnparsedError, UnspacedBlock, parse
 from ncfix.text.numbers import POINT, SIGN, table
 from ncfix.text.reach import UNREAD
 from ncfix.text.shapes import ODD, Scan, block_of, blocks_at, in_slices, scan_beside, scan_compiled, split_blocks
@@ -48,6 +48,11 @@ from ncfix.text.tree import (
 )
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.plans import MOVING, SIZES, owners
+
+if TYPE_CHECKING:
+    from lark import Token
+
+    from ncfix.text.build import Branch, Node
 
 COMMENT = re.compile(rb";[^\r\n]*")
 JOINED = re.compile(rb"~[ \t]*(?=\r*\n)")
@@ -222,7 +227,7 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
     try:
         tree = parse(dialect, code)
         return built(tree, text)
-    except (UnexpectedInput, TooDeepError):
+    except (UnparsedError, TooDeepError):
         return unread_block()
 
 
@@ -311,7 +316,7 @@ class Maker:
         nodes = list(tree.children)
         while nodes:
             node = nodes.pop(0)
-            if isinstance(node, Token):
+            if is_token(node):
                 yield self.terminal(node, nodes)
             elif kind(node) in ("plane", "datum"):
                 nodes = [*node.children, *nodes]
@@ -385,7 +390,7 @@ class Maker:
 
     def name(self, node: Node) -> Expression:
         """The number or name of a tool."""
-        if isinstance(node, Token):
+        if is_token(node):
             return StringLiteral(str(node).strip('"')) if kind(node) == "STRING" else Constant(value_of(str(node)))
         return self.expression(node)
 
@@ -395,7 +400,7 @@ class Maker:
         """The expression that a tree, or the terminal of a number, stands for."""
         if depth > MAX_DEPTH:
             raise TooDeepError(0)
-        if isinstance(node, Token):
+        if is_token(node):
             return Literal(self.builder.slots[edges(node)])
         parts = node.children
         match kind(node):

@@ -13,25 +13,23 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lark import Tree, UnexpectedInput
-
 from ncfix.control.interpreter import RUNTIME
 from ncfix.diagnostics import SourceError
 from ncfix.plugins import working
 from ncfix.text.build import (
-    Branch,
     Parsed,
     TooDeepError,
     TreeBuilder,
     build,
     check_exponents,
     check_numbers,
+    is_token,
     kind,
     start_of,
 )
 from ncfix.text.dialect import Dialect
 from ncfix.text.faults import BlockError, bare_expression, explain
-from ncfix.text.grammar import UnspacedBlock, parse, parser, squeeze
+from ncfix.text.grammar import UnparsedError, UnspacedBlock, parse, parser, squeeze
 from ncfix.text.language import BulkLayout
 from ncfix.text.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has_free_text, layout_of
 from ncfix.text.reach import tape_end
@@ -47,6 +45,7 @@ from ncfix_iso.rs274.interpreter import RS274Interpreter
 
 if TYPE_CHECKING:
     from ncfix.control.interpreter import FlatLine
+    from ncfix.text.build import Branch
 
 
 MAY_REPEAT = frozenset("GM")
@@ -80,8 +79,8 @@ def parsed_words(
     """One block, by the grammar alone; raises `BlockError`, and NCF507 where a plugin's grammar makes no such tree."""
     try:
         tree = parse(dialect, squeezed.code)
-    except UnexpectedInput as error:
-        raise explain(error, text, squeezed) from None
+    except UnparsedError as error:
+        raise explain(error.place, text, squeezed) from None
     try:
         return build(tree, text, squeezed, maker, dialect.keywords)
     except TooDeepError as error:
@@ -94,7 +93,7 @@ def parsed_words(
 
 def shown(tree: Branch) -> str:
     """A tree in one line: word(ADDRESS X, literal(NUMBER 1))."""
-    inside = (shown(each) if isinstance(each, Tree) else f"{kind(each)} {each}" for each in tree.children)
+    inside = (f"{kind(each)} {each}" if is_token(each) else shown(each) for each in tree.children)
     return f"{kind(tree)}({', '.join(inside)})"
 
 

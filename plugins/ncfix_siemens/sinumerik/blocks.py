@@ -8,27 +8,25 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from functools import reduce
-
-from lark import Token, UnexpectedInput
+from typing import TYPE_CHECKING
 
 from ncfix.text.build import (
     MAX_DEPTH,
     NUMBERS,
-    Branch,
-    Node,
     Parsed,
     TooDeepError,
     TreeBuilder,
     check_exponents,
     check_numbers,
     edges,
+    is_token,
     kind,
     start_of,
     tokens_of,
 )
 from ncfix.text.dialect import Dialect
-from ncfix.text.faults import BlockError, position_of
-from ncfix.text.grammar import UnspacedBlock, parse
+from ncfix.text.faults import BlockError
+from ncfix.text.grammar import UnparsedError, UnspacedBlock, parse
 from ncfix.text.tree import (
     END,
     START,
@@ -55,6 +53,11 @@ from ncfix.text.tree import (
 from ncfix.values import frozen
 from ncfix_siemens.sinumerik.vocabulary import SETTERS
 
+if TYPE_CHECKING:
+    from lark import Token
+
+    from ncfix.text.build import Branch, Node
+
 BRACKET = "("
 """The operator of a `Unary` that is nothing but a pair of brackets."""
 
@@ -70,7 +73,7 @@ def build(tree: Branch, text: str) -> Parsed:
     builder = SinumerikBuilder(text, whole, slots, tuple(stop for _, stop in spans))
     items = tuple(builder.block(tree))
     last = tree.children[-1] if tree.children else None
-    comment = edges(last)[0] if isinstance(last, Token) and kind(last) == "COMMENT" else -1
+    comment = edges(last)[0] if last is not None and is_token(last) and kind(last) == "COMMENT" else -1
     return Parsed(Template(items, len(tokens)), spans, tuple(value_of(token) for token in tokens), comment)
 
 
@@ -86,7 +89,7 @@ class SinumerikBuilder(TreeBuilder):
     def block(self, tree: Branch) -> Iterator[Item]:
         """The items of a block in the order written."""
         for node in tree.children:
-            if isinstance(node, Token):
+            if is_token(node):
                 yield self.token(node)
             else:
                 yield from self.statement(node)
@@ -174,7 +177,7 @@ class SinumerikBuilder(TreeBuilder):
         """`DEF type name, name = value`: a command with the type, and each name with its value or None."""
         parts: list[Expression | None] = []
         for node in tree.children:
-            if isinstance(node, Token):
+            if is_token(node):
                 if kind(node) == "TYPE":
                     parts.append(StringLiteral(str(node).split("[")[0].strip().lower()))
                 continue
@@ -231,7 +234,7 @@ class SinumerikBuilder(TreeBuilder):
         yield OWordLine("", "case", (self.expression(value),), head)
         for choice in choices:
             *before, keyword, where = choice.children  # type: ignore[union-attr]
-            values = tuple(self.expression(node) for node in before if not isinstance(node, Token))
+            values = tuple(self.expression(node) for node in before if not is_token(node))
             name = "of" if kind(choice) == "choice" else "default"
             yield OWordLine(destination(where), f"{name} {str(keyword).lower()}", values, self.span(choice))
 
@@ -239,7 +242,7 @@ class SinumerikBuilder(TreeBuilder):
 
     def arguments(self, node: Node, depth: int = 0) -> tuple[Expression | None, ...]:
         """What stands between brackets; None where an argument is left out."""
-        assert not isinstance(node, Token)
+        assert not is_token(node)
         values = tuple(None if kind(part) == "omitted" else self.expression(part, depth) for part in node.children)
         return () if values == (None,) else values
 
@@ -310,10 +313,10 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
     """One block; raises `BlockError` where not even a name could excuse it."""
     try:
         parsed = build(parse(dialect, text), text)
-    except UnexpectedInput as error:
+    except UnparsedError as error:
         if NAME.search(QUOTED.sub(" ", text)):
             return Parsed(Template((Opaque(STATEMENT, WHOLE),), 0), (), (), -1)
-        raise explained(error, text) from None
+        raise explained(error.place, text) from None
     except TooDeepError as error:
         raise BlockError("NCF118", "the expression is nested too deep, or too long", error.position) from None
     check_numbers(parsed)
@@ -331,9 +334,8 @@ def check_repeats(parsed: Parsed) -> None:
         seen.add(word.address)
 
 
-def explained(error: UnexpectedInput, text: str) -> BlockError:
-    """The parser's complaint in words."""
-    place = position_of(error, text)
+def explained(place: int, text: str) -> BlockError:
+    """Why the parser stopped at a place, in words."""
     before, at = text[:place].rstrip(), text[place : place + 1]
     if before.endswith("="):
         return BlockError("NCF114", "there is no value after =", place)

@@ -6,8 +6,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field
 from math import isfinite
-
-from lark import Token, Tree
+from typing import TYPE_CHECKING
 
 from ncfix.text.faults import BlockError
 from ncfix.text.grammar import UnspacedBlock
@@ -36,14 +35,18 @@ from ncfix.text.tree import (
 )
 from ncfix.values import frozen
 
+if TYPE_CHECKING:
+    from lark import Token, Tree
+    from typing_extensions import TypeIs
+
+    Branch = Tree[Token]
+    Node = Branch | Token
+
 NUMBERS = frozenset({"NUMBER", "UNSIGNED"})
 """The terminals whose text is a number of the block; every other digit belongs to its shape."""
 
 MAX_DEPTH = 150
 """How deep expressions may be nested, or how many operators they may chain; a control allows less."""
-
-Branch = Tree[Token]
-Node = Branch | Token
 
 
 class TooDeepError(Exception):
@@ -94,12 +97,17 @@ def build(
 def final_comment(tree: Branch) -> Token | None:
     """The comment that ends the block, if one does."""
     last = tree.children[-1] if tree.children else None
-    return last if isinstance(last, Token) and kind(last) == "COMMENT" else None
+    return last if last is not None and is_token(last) and kind(last) == "COMMENT" else None
+
+
+def is_token(node: Node) -> TypeIs[Token]:
+    """Whether a node is a terminal, which is text; Lark need not be loaded to see that."""
+    return isinstance(node, str)
 
 
 def kind(node: Node) -> str:
     """The name of a rule or terminal in its own grammar, without that of the grammar that it was imported from."""
-    name = node.type if isinstance(node, Token) else str(node.data)
+    name = node.type if is_token(node) else str(node.data)
     return name.rpartition("__")[2]
 
 
@@ -108,7 +116,7 @@ def tokens_of(tree: Branch) -> Iterator[Token]:
     stack: list[Node] = [tree]
     while stack:
         node = stack.pop()
-        if isinstance(node, Token):
+        if is_token(node):
             yield node
         else:
             stack.extend(reversed(node.children))
@@ -160,7 +168,7 @@ class TreeBuilder:
 
     def item(self, node: Node) -> Item:
         """One item of a block."""
-        if isinstance(node, Token):
+        if is_token(node):
             return self.terminal(node)
         makers: dict[str, Callable[[Branch], Item]] = {
             "word": self.word,
@@ -235,7 +243,7 @@ class TreeBuilder:
 
     def expression(self, node: Node, depth: int = 0) -> Expression:
         """The expression that a tree, or the terminal of a number, stands for."""
-        if isinstance(node, Token):
+        if is_token(node):
             return self.literal(node)
         if depth > MAX_DEPTH:
             raise TooDeepError(edges(node)[0])
@@ -280,7 +288,7 @@ class TreeBuilder:
 
 def edges(node: Node) -> tuple[int, int]:
     """Start and stop of a rule or terminal in the squeezed block."""
-    if isinstance(node, Token):
+    if is_token(node):
         return node.start_pos or 0, node.end_pos or 0
     return node.meta.start_pos, node.meta.end_pos
 

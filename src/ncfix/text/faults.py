@@ -5,9 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import field
 
-from lark import UnexpectedInput
-from lark.exceptions import UnexpectedCharacters, UnexpectedToken
-
 from ncfix.text.grammar import UnspacedBlock
 from ncfix.values import frozen
 
@@ -52,20 +49,11 @@ class BlockError(Exception):
     hint: str = ""
 
 
-def explain(error: UnexpectedInput, text: str, squeezed: UnspacedBlock) -> BlockError:
-    """The fault behind a complaint of the parser about one squeezed block."""
-    stop = Stop(text, squeezed, position_of(error, squeezed.code))
+def explain(place: int, text: str, squeezed: UnspacedBlock) -> BlockError:
+    """The fault of a block, from the place in it, without blanks, at which the parser stopped."""
+    stop = Stop(text, squeezed, place)
     found = (look(stop) for look in (in_comment, in_number, in_expression, in_brackets, in_flow, in_word))
     return next((fault for fault in found if fault), None) or unexpected(stop)
-
-
-def position_of(error: UnexpectedInput, code: str) -> int:
-    """Where in the squeezed block the parser stopped; its length if it missed something at the end."""
-    if isinstance(error, UnexpectedToken) and error.token.type == "$END":
-        return len(code)
-    if isinstance(error, UnexpectedCharacters | UnexpectedToken) and error.pos_in_stream is not None:
-        return int(error.pos_in_stream)
-    return len(code)
 
 
 @frozen

@@ -20,7 +20,7 @@ from ncfix.plugins import describe, working
 from ncfix.values import frozen
 
 if TYPE_CHECKING:
-    from lark import Lark, Token, Tree
+    from lark import Lark, Token, Tree, UnexpectedInput
 
     from ncfix.text.dialect import Dialect
 
@@ -106,8 +106,18 @@ def parser_of(name: str, tables: str | None = None) -> Lark:
     )
 
 
+class UnparsedError(Exception):
+    """The grammar has no such block; `place` is where in it the parser stopped, its length if it lacks something."""
+
+    def __init__(self, place: int) -> None:
+        super().__init__(place)
+        self.place = place
+
+
 def parse(dialect: Dialect, code: str) -> Tree[Token]:
-    """The tree of one squeezed block; raises Lark's own `UnexpectedInput`."""
+    """The tree of one squeezed block; raises `UnparsedError`."""
+    from lark import UnexpectedInput
+
     try:
         grammar = parser(dialect.grammar)
     except Exception as error:
@@ -115,4 +125,15 @@ def parse(dialect: Dialect, code: str) -> Tree[Token]:
             if isinstance(error, FileNotFoundError):
                 raise
             raise ValueError(f"{Path(dialect.grammar).name}: {describe(error)}") from error
-    return grammar.parse(code)
+    try:
+        return grammar.parse(code)
+    except UnexpectedInput as error:
+        raise UnparsedError(_place(error, len(code))) from None
+
+
+def _place(error: UnexpectedInput, length: int) -> int:
+    from lark.exceptions import UnexpectedCharacters, UnexpectedToken
+
+    at_end = isinstance(error, UnexpectedToken) and error.token.type == "$END"
+    known = isinstance(error, UnexpectedCharacters | UnexpectedToken) and error.pos_in_stream is not None
+    return int(error.pos_in_stream or 0) if known and not at_end else length
