@@ -81,13 +81,22 @@ def test_what_acts_after_the_motion_stays_after_it() -> None:
     assert re.search(r"\nF450 M1\n", text)
 
 
+@pytest.mark.parametrize("dialect", ["linuxcnc", "iso"])
+def test_a_modal_feed_counts_up_to_a_change_of_inch_and_mm(dialect: str) -> None:
+    """F450 is given in mm and in force in mm; that the program has inches, too, does not matter."""
+    assert corrected("F450\nG1 A90\nG20\nX1 F10\n", dialect) == (
+        corrected("F450\nG1 A90\n", dialect)[0].replace("M2\n", "G20\nX1 F10\nM2\n"),
+        {},
+    )
+
+
 def test_a_turn_that_needs_no_linear_motion_stays_as_it_is() -> None:
     assert corrected("G1 A90 F450\n", "iso", shift=0.0004) == ("G1 A90 F450\nM2\n", {})
 
 
 @pytest.mark.parametrize(
     "text",
-    ["G95 S100 M3 G1 A90 F1\n", "F450\nG20\nG1 A90\n", "#1=450\nG1 A90 F[#1]\nG20\nX1 F1\n"],
+    ["G95 S100 M3 G1 A90 F1\n", "F450\nG20\nG1 A90\n", "G20 G1 A90 F450\n", "F450\nG20\nG21\nG1 A90\n"],
 )
 def test_a_turn_of_unknown_time_is_not_written(text: str) -> None:
     _, conflicts = corrected(text, "linuxcnc")
@@ -107,10 +116,12 @@ def test_a_turn_in_inverse_time_keeps_its_time_by_itself() -> None:
     assert corrected("G93 G1 A90 F5\n", "iso") == ("G93 G1 A90 Y0.020 F5\nM2\n", {})
 
 
-@pytest.mark.parametrize("pieces", [1, 3])
-def test_a_turn_in_inverse_time_that_linuxcnc_would_hurry_has_its_time_by_a_feed_per_minute(pieces: int) -> None:
+@pytest.mark.parametrize(("pieces", "unit"), [(1, ""), (3, ""), (1, "G20\n"), (3, "G20\n")])
+def test_a_turn_in_inverse_time_that_linuxcnc_would_hurry_has_its_time_by_a_feed_per_minute(
+    pieces: int, unit: str
+) -> None:
     """0.02 mm in half a minute is 0.04 mm a minute; LinuxCNC makes that 0.1, and the turn would be over too soon."""
-    text = "G93 G1 A90 F2\nX12 F2\n"
+    text = unit + "G93 G1 A90 F2\nX12 F2\n"
     after, conflicts = corrected(text, "linuxcnc", pieces)
     assert not conflicts
     assert minutes(after, "linuxcnc") == pytest.approx(minutes(text, "linuxcnc"), rel=1e-4)  # F has six digits

@@ -7,7 +7,6 @@ output or a message.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
@@ -77,7 +76,7 @@ def modes(control: MacroControl) -> dict[int, Getter]:
         8: lambda: control.modal.tool_code / 10,
         10: lambda: 99.0 if control.modal.retract_to_r else 98.0,
         control.rules.offset_group: lambda: float(SYSTEM_CODES.get(control.modal.system, 54)),
-        109: lambda: 0.0 if math.isnan(control.modal.feed) else control.modal.feed / control.modal.unit,
+        109: lambda: control.feed_in_force,
         111: lambda: float(tools.offset or 0),
         119: lambda: control.modal.speed,
         120: lambda: Unknown("T", tools.selected) if tools.doubtful else float(tools.selected),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,7 @@ from ncfix_heidenhain.klartext.arcs import Step, circular, circular_by_radius, c
 from ncfix_heidenhain.klartext.blocks import unread_line
 from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.lane import run_lane
-from ncfix_heidenhain.klartext.layout import CORNERS, TURN_DEGREES, axis_numbers, poles_move
+from ncfix_heidenhain.klartext.layout import CORNERS, TURN_DEGREES, axis_numbers, poles_move, words_alone_turn
 from ncfix_heidenhain.klartext.lines import straight, straight_polar
 from ncfix_heidenhain.klartext.plans import CARTESIAN, MOVING, POLAR, VECTOR, KlartextPlan
 from ncfix_heidenhain.klartext.statements import (
@@ -161,6 +162,11 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         control.locate = self.place
         control.modal.unit, control.unit_said = self.main.mm, True
         control.recompose()
+
+    def moves(self) -> Moves:
+        """See `Interpreter`; rotary axes do not get words everywhere."""
+        moves = super().moves()
+        return replace(moves, words_alone_turn=words_alone_turn(self.main.program)[moves.block])
 
     def spellings(self, name: str) -> Iterable[str]:
         """See `Interpreter`: beside this program, without folders."""

@@ -33,6 +33,8 @@ from ncfix_heidenhain.klartext.plans import POLAR, VECTOR, opens_block, own_word
 CORNERS = frozenset({"rnd", "chf"})
 """Corners that the control makes of the end of one motion and the beginning of the next."""
 
+STRAIGHT = frozenset({"", "l", "ln", "lp"})
+
 TURN_DEGREES = 360.0
 
 AXIS_WORDS = frozenset({*AXIS_LETTERS, *(f"I{letter}" for letter in AXIS_LETTERS)})
@@ -175,6 +177,19 @@ def beside_corners(program: Program) -> NDArray[np.bool_]:
         found[blocks[:-1]] |= corners[1:]
         found[blocks[1:]] |= corners[:-1]
     return found
+
+
+def words_alone_turn(program: Program) -> NDArray[np.bool_]:
+    """(n,) blocks in which rotary axes get no word unless there is one for some of them.
+
+    All in a program with tilted planes: the control would not keep the tip where it is. Paths that are made in a plane,
+    or lead to or away from one.
+    """
+    if tilts(program.source):
+        return np.ones(len(program), dtype=np.bool_)
+    layouts = [_of_shape(Shape(template)) for template in program.templates]
+    found = np.array([layout is not None and layout[0].name not in STRAIGHT for layout in layouts], dtype=np.bool_)
+    return found[program.template] | beside_corners(program)
 
 
 @lru_cache(maxsize=4096)

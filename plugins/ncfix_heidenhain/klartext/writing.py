@@ -21,12 +21,11 @@ from ncfix.writer.block import EXACT, BlockWriter
 from ncfix.writer.target import Target
 from ncfix_heidenhain.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text, is_relied_on, pole_in_force
 from ncfix_heidenhain.klartext.control import BY_DEPTH, FROM_START
-from ncfix_heidenhain.klartext.layout import TURN_DEGREES, KlartextLayout, poles_move, tilts, uses_comma
+from ncfix_heidenhain.klartext.layout import STRAIGHT, TURN_DEGREES, KlartextLayout, poles_move, uses_comma
 from ncfix_heidenhain.klartext.plans import VECTOR
 
 FloatArray = NDArray[np.float64]
 
-STRAIGHT = frozenset({"", "l", "ln", "lp"})
 BY_PATH = frozenset({"c", "ct", "ctp", "cp", "lp"})
 """Functions whose meaning depends on where the tool stands or comes from, or on a pole."""
 
@@ -115,15 +114,11 @@ class KlartextWriter(BlockWriter):
     def _may_add(self, column: int) -> bool:
         """Not a rotary axis that is not corrected and stands where it should, but for the digits of its last word.
 
-        Not one in a program with tilted planes: the control would not keep the tip where it is; nor on paths that are
-        made in a plane, or lead to or away from one. Not the tool axis beside a corner that the control makes, which
-        lies in the working plane, or in a departure.
+        Not the tool axis beside a corner that the control makes, which lies in the working plane, or in a departure.
         """
         layout = self.layout
         if self._is_rotary(column):
-            turned = any(letter in layout.axes for letter in "ABC")
-            bare = layout.corner or layout.name not in ("", "l", "ln", "lp")
-            if self._stands(column) or (not turned and (bare or tilts(self.program.source))):
+            if self._stands(column):
                 return False
         elif (layout.corner or layout.name.startswith("dep")) and column == self.target.spatial[2]:
             return False

@@ -80,15 +80,9 @@ def modes(control: RS274Control) -> dict[str, Getter]:
         "_lathe_radius_mode": flag("diameter", False),
         "_spindle_on": lambda: float(control.modal.spindle != 5),
         "_spindle_cw": flag("spindle", 3),
-        "_feed": lambda: feed(control),
+        "_feed": lambda: control.feed_in_force,
         "_rpm": lambda: abs(control.modal.speed),
     }
-
-
-def feed(control: RS274Control) -> float:
-    """F in program units."""
-    unit = 1.0 if control.modal.feed_mode == 93 else control.modal.unit
-    return number_or_zero(control.modal.feed) / unit
 
 
 def system_code(system: int) -> int:

@@ -161,9 +161,7 @@ def plane(control: Sinumerik, code: int) -> None:
 
 def units(control: Sinumerik, code: int) -> None:
     """G70, G71, G700, G710."""
-    control.unit_said = True
-    control.modal.unit = INCH if code in (700, 7000) else 1.0
-    control.refresh()
+    control.count_in(INCH if code in (700, 7000) else 1.0)
 
 
 def settable(control: Sinumerik, code: int) -> None:

@@ -22,10 +22,12 @@ from numpy.typing import NDArray
 
 from ncfix.control.builder import MotionBuilder, MotionStyle
 from ncfix.control.coordinates import LETTERS, Vector, mask_of, rotated
+from ncfix.control.expressions import Unknown, Value
 from ncfix.control.flow import BlockBudget
 from ncfix.control.moves import (
     AT_START,
     PASS_RULES,
+    FeedMode,
     Motion,
     MotionEnd,
     MotionKind,
@@ -150,6 +152,25 @@ class ProgramControl(ControlState):
     def takes_zero_across(self) -> bool:
         """Whether an arc may have a centre word across its plane, a zero (I, J and K in all of them)."""
         return True
+
+    def count_in(self, unit: float) -> None:
+        """Inch or mm comes into force, `unit` in mm.
+
+        What a feed from before is then is not known: a rotary axis keeps its degrees, and not every control the rest.
+        """
+        modal = self.modal
+        if unit != modal.unit and modal.feed_mode != FeedMode.INVERSE_TIME:
+            modal.feed = math.nan
+        self.unit_said, modal.unit = True, unit
+        self.refresh()
+
+    @property
+    def feed_in_force(self) -> Value:
+        """The number of the F in force; zero without one."""
+        modal = self.modal
+        if math.isnan(modal.feed):
+            return Unknown("F") if modal.feed_given else 0.0
+        return modal.feed / (1.0 if modal.feed_mode == FeedMode.INVERSE_TIME else modal.unit)
 
     def moves(self) -> Moves:
         """The motions so far."""

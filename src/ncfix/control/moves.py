@@ -188,6 +188,7 @@ class Moves:
     tcp_length   (n,) mm, the length by which the control leads X Y Z under TCP, where that is not the tool's: zero
                  while none is in force, so that it leads the spindle reference, not the tip; else NaN. None: nowhere
     exact_stop   (n,) the control comes to a stop at the end of every motion (G60, G61). None: nowhere
+    words_alone_turn  (n,) rotary axes get a word only if the motion has one for some of them. None: nowhere
     """
 
     axes: tuple[str, ...]
@@ -231,6 +232,7 @@ class Moves:
     spelled: NDArray[np.bool_] | None = None
     tcp_length: NDArray[np.float64] | None = None
     exact_stop: NDArray[np.bool_] | None = None
+    words_alone_turn: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.block)
@@ -259,6 +261,14 @@ class Moves:
         if self.placed is not None:
             wordless = ~(self.placed | self.programmed)
         return wordless if self.resting is None else wordless | self.resting
+
+    @property
+    def idle(self) -> NDArray[np.bool_]:
+        """(n, n_axes) axes that no correction moves: those without words, and rotary axes that get none here."""
+        if self.words_alone_turn is None:
+            return self.wordless
+        rests = self.words_alone_turn & ~(self.programmed & self.rotary).any(axis=1)
+        return self.wordless | (self.rotary & rests[:, None])
 
     @property
     def increments(self) -> NDArray[np.bool_]:

@@ -157,6 +157,7 @@ def joined_moves(parts: list[Moves], blocks: list[int]) -> Moves:
 
 LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
     "rotary_as_programmed": lambda moves: np.zeros(len(moves), dtype=np.bool_),
+    "words_alone_turn": lambda moves: np.zeros(len(moves), dtype=np.bool_),
     "approach": lambda moves: np.full(moves.end.shape, np.nan),
     "placed": lambda moves: np.ones(moves.end.shape, dtype=np.bool_),
     "spelled": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),

@@ -30,7 +30,10 @@ from ncfix.values import mutable
 
 FloatArray = NDArray[np.float64]
 
-UNTIMED = "rotary axes turn alone, and the time that takes is not known: their feed is no plain number"
+UNTIMED = (
+    "rotary axes turn alone, and the time that takes is not known: their feed is no plain number, or was not given"
+    " since inch or mm came into force"
+)
 
 
 def turns_alone(moves: Moves) -> NDArray[np.bool_]:
@@ -53,19 +56,19 @@ def turn_alone(moves: Moves, row: int) -> float:
     return float(np.rad2deg(np.linalg.norm(way[moves.rotary])))
 
 
-def minutes(moves: Moves, row: int, own_feed: bool) -> float:
-    """The time of a motion at feed that turns rotary axes alone, in minutes; NaN for others, infinite if not known.
+def written_feed(moves: Moves, row: int) -> float:
+    """The number of the F in force in a motion; NaN if it is not known."""
+    unit = 1.0 if moves.feed_mode[row] == FeedMode.INVERSE_TIME else moves.frames[moves.frame[row]].unit
+    return float(moves.feed[row] / unit)
 
-    An F that stood before a change between inch and mm keeps its degrees, but no longer shows them: with two units in
-    a program, only an F of the motion's own block is known (`own_feed`).
-    """
+
+def minutes(moves: Moves, row: int) -> float:
+    """The time of a motion at feed that turns rotary axes alone, in minutes; NaN for others, infinite if not known."""
     turn, mode = turn_alone(moves, row), moves.feed_mode[row]
     if not turn or mode == FeedMode.INVERSE_TIME:
         return float("nan")
-    if not own_feed and len({frame.unit for frame in moves.frames}) > 1:
-        return float("inf")
-    feed = moves.feed[row] / moves.frames[moves.frame[row]].unit
-    return float(turn / feed) if mode == FeedMode.PER_MINUTE and feed > 0 else float("inf")
+    feed = written_feed(moves, row)
+    return turn / feed if mode == FeedMode.PER_MINUTE and feed > 0 else float("inf")
 
 
 Mask = NDArray[np.bool_]

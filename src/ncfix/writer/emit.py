@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ncfix.control.moves import FeedMode, Kinematics, MotionKind, Moves, Rule
 from ncfix.control.tcp import jumps, passed_through, renamed
-from ncfix.control.turns import UNTIMED, minutes, turn_alone, turns_alone
+from ncfix.control.turns import UNTIMED, minutes, turn_alone, turns_alone, written_feed
 from ncfix.text.language import BlockLayout, language_of
 from ncfix.text.tree import Program, view
 from ncfix.text.writer import Edit, Splices, overlong
@@ -125,7 +125,7 @@ class _Emitter:
         self.kind, self.rotary = view(moves.kind), tuple(moves.rotary.tolist())
         plain = np.isin(moves.kind, (MotionKind.RAPID, MotionKind.FEED, MotionKind.ARC)) & (moves.rule != Rule.PASS)
         self.forgets, self.relies = (view(mask) for mask in (moves.kind != MotionKind.DWELL, plain))
-        self.wordless, self.increments = moves.wordless, moves.increments
+        self.wordless, self.increments = moves.idle, moves.increments
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
         self.spatial = (x, y, z)
         self.layouts: dict[int, BlockLayout | None] = {}
@@ -351,7 +351,7 @@ class _Emitter:
             inverse_time=int(moves.feed_mode[row]) == FeedMode.INVERSE_TIME and modal != 0,
             code=modal if arc else straight,
             active_code=modal if self.replaced is None else self.replaced,
-            feed=float(moves.feed[row] / moves.frames[moves.frame[row]].unit),
+            feed=written_feed(moves, row),
             turn_minutes=self._turn_minutes(row),
             turn_by_feed=self.program.dialect.feed_of == "linear",
             arcs=arcs,
@@ -375,8 +375,7 @@ class _Emitter:
         """The time of a turn of rotary axes alone, where the control might give its feed to linear axes."""
         if self.program.dialect.feed_of == "all" or not self.turns[row]:
             return float("nan")
-        own = self.program.template_of(self.moves.block[row]).slots
-        return minutes(self.moves, row, own_feed="F" in own)
+        return minutes(self.moves, row)
 
     def _before(self, row: int) -> FloatArray:
         """Where axes stand that the block does not name; in a canned cycle the depth of the last hole counts."""

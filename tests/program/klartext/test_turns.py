@@ -9,7 +9,7 @@ import pytest
 
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
-from ncfix.control.setup import Setup
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
 from ncfix.text.reader import read
 from ncfix_heidenhain.klartext.writing import extremes, on_its_side
@@ -66,3 +66,27 @@ def test_the_linear_axes_know_that_a_table_is_held_at_zero() -> None:
     done = fix_program(read(program(body), "t.h"), machine, SETUP, FixOptions(strategy="full"))
     assert not re.search(rb"[BC]-", done.text)
     assert done.report.error_after_um["max"] <= 1.0  # the tolerance; 2.1 um where X and Z were those of the other angle
+
+
+def test_axes_that_a_plane_has_turned_are_not_planned_to_turn_further() -> None:
+    """They get no words where the program has none: what the linear axes make up for is where they stand."""
+    machine = load(str(Path(__file__).parents[2] / "goldens/machines/table.toml"))
+    setup = Setup(initial=dict.fromkeys("XYAC", 0.0) | {"Z": 350.0}, tools={1: Tool(80.0, 3.0)}, assume_zero=True)
+    body = "TOOL CALL 1 Z\nL X+0 Y+0 Z+200 R0 FMAX\nPLANE SPATIAL SPA+32.5 SPB+5 SPC-69 STAY SEQ-\nL A+Q120 C+Q122 FMAX"
+    ends = "\nL X+9 Y-12 Z+5 FMAX\nPLANE RESET STAY\nL X+40 Y+74 Z-7 F500\nL X+41\nL Y+88 Z-9\nL A+0 C+0 FMAX\nL X+3"
+    source = read(program(body + ends), "t.h")
+    texts = [
+        fix_program(source, machine, setup, FixOptions(allow_refused=True, strategy=strategy)).text.decode()
+        for strategy in ("full", "position")
+    ]
+    behind = [text.partition("PLANE RESET STAY")[2].partition("L A+0")[0] for text in texts]
+    assert behind[0] == behind[1]
+
+
+def test_an_arc_gets_no_rotary_word_and_x_y_z_know_it() -> None:
+    """What A and C would be corrected by on the arc is left; 2.3 um were, where X Y Z took it for done."""
+    machine = load(str(Path(__file__).parents[2] / "goldens/machines/table.toml"))
+    setup = Setup(initial=dict.fromkeys("XYAC", 0.0) | {"Z": 350.0}, tools={1: Tool(80.0, 3.0)}, assume_zero=True)
+    body = "TOOL CALL 1 Z\nL X+50 Y+200 Z+20 A+20 C+30 R0 FMAX\nL X+51 Y+200 F500\nCR X+50 Y+0 R+100 DR-\nL X-100 Y-100"
+    done = fix_program(read(program(body), "t.h"), machine, setup, FixOptions(strategy="full"))
+    assert done.report.error_after_um["max"] <= 1.0 + 0.2  # the tolerance, and half a digit of five axes

@@ -258,8 +258,8 @@ def held_axes(intent: Intent, move: Index) -> Mask:
     held = np.zeros((len(move), len(intent.machine.axes)), dtype=bool)
     if intent.moves.rotary_as_programmed is not None:
         held |= intent.moves.rotary_as_programmed[move][:, None] & intent.machine.rotary
-    if intent.wordless is not None:
-        held |= intent.wordless[move] & intent.machine.rotary
+    if intent.idle is not None:
+        held |= intent.idle[move] & intent.machine.rotary
     return held
 
 
@@ -319,10 +319,10 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
 
 def with_rotary_as_it_stands(intent: Intent, ends: Ends, unchanged: Mask, before: Array | None) -> Ends:
     """The ends with X Y Z for rotary axes that get no word, where corrections before have left these."""
-    if intent.wordless is None:
+    if intent.idle is None:
         return ends
     stands = standing(intent.machine, intent.moves, ends.wanted, unchanged, before).end
-    off = intent.wordless & intent.machine.rotary & (stands != ends.wanted) & ~unchanged[:, None]
+    off = intent.idle & intent.machine.rotary & (stands != ends.wanted) & ~unchanged[:, None]
     rows = np.flatnonzero(off.any(axis=1))
     if not rows.size:
         return ends

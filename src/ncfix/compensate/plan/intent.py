@@ -93,6 +93,12 @@ class Intent:
         return wordless if wordless.any() else None
 
     @cached_property
+    def idle(self) -> Mask | None:
+        """(n, n_axes) axes that a correction leaves where they stand, see `Moves.idle`; None if there are none."""
+        idle = self.moves.idle
+        return idle if idle.any() else None
+
+    @cached_property
     def mute(self) -> Mask | None:
         """(n, 3) which of X, Y and Z they are; None if none anywhere."""
         mute = None if self.wordless is None else self.wordless[:, self.columns]
@@ -284,7 +290,7 @@ def stays(moves: Moves, unchanged: Mask, shift: Array, before: Array | None) -> 
     moving = (shift != 0).any(axis=0)
     if before is not None:
         moving |= before != 0
-    return moves.wordless & ~unchanged[:, None] & moving
+    return moves.idle & ~unchanged[:, None] & moving
 
 
 def left_in_cuts(moves: Moves) -> dict[str, Index]:

@@ -420,9 +420,9 @@ def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: S
 
 def _as_they_stand(intent: Intent, real: Segments, move: Index, fraction: Array, command: Array) -> Array:
     """Corrected commands (k, n_axes) with the axes that get no word as `real` has them, X Y Z for such rotary axes."""
-    if intent.wordless is None:
+    if intent.idle is None:
         return command
-    stand, idle = real.at(move, fraction), intent.wordless[move]
+    stand, idle = real.at(move, fraction), intent.idle[move]
     result = np.where(idle, stand, command)
     turned = np.flatnonzero((idle & intent.machine.rotary & (stand != command)).any(axis=1))
     if turned.size:
