@@ -151,6 +151,7 @@ def test_a_refusal_writes_nothing_unless_allowed(shop: Any, ncfix: Any) -> None:
     assert [(each["line"], each["code"]) for each in entry["refused"]] == [(3, "NCF404")]
     assert re.search(rf"{shop.program}:3: NCF404: .*\n    G1 X500 F600\n", result.err)
     assert not (shop.folder / "out.ngc").exists()
+    assert "--flatten" not in result.err  # there is nothing to be written out
     allowed = fixed(shop, ncfix, "--allow-refused")
     assert "  tip error           no figure: nothing that cuts was corrected\n" in allowed.err
     assert "  no figure for 1 motion at feed: 1 refused\n" in allowed.err

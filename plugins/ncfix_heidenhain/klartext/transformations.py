@@ -243,7 +243,7 @@ def rotate(control: KlartextControl, words: MotionWords, text: str) -> None:
 def scale(control: KlartextControl, words: MotionWords, text: str) -> None:
     """Cycle 11: `11.1 SCL 0.9`."""
     suspend(control, words, "scale")
-    factor = words.values.get("SCL", 1.0)
+    factor = 1.0 if "SCL" in words.unknown else words.values.get("SCL", 1.0)
     if factor <= 0.0:
         control.suspend("scale", "a scale that is not above zero (cycle 11)")
     scale_by(control, factor if factor > 0.0 else 1.0)

@@ -39,7 +39,7 @@ def plane(control: RS274Control, block: Block, code: int) -> None:
 
 def units(control: RS274Control, block: Block | None, code: int) -> None:
     """G20 and G21."""
-    control.count_in(INCH if code == 200 else 1.0)
+    control.set_unit(INCH if code == 200 else 1.0)
 
 
 def diameter(control: RS274Control, block: Block, code: int) -> None:

@@ -161,7 +161,7 @@ def plane(control: Sinumerik, code: int) -> None:
 
 def units(control: Sinumerik, code: int) -> None:
     """G70, G71, G700, G710."""
-    control.count_in(INCH if code in (700, 7000) else 1.0)
+    control.set_unit(INCH if code in (700, 7000) else 1.0)
 
 
 def settable(control: Sinumerik, code: int) -> None:

@@ -122,7 +122,10 @@ class PrecedingMotion:
         return self.rounds[-1].position
 
 
-RELATIVE_CYCLE = "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended"
+RELATIVE_CYCLE = (
+    "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended; --flatten writes"
+    " it absolutely"
+)
 NONE: Mapping[int, Reason] = MappingProxyType({})
 CODE_OF_RULE = "NCF432"
 CODE_OF_TEXT = "NCF433"

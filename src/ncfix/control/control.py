@@ -153,7 +153,7 @@ class ProgramControl(ControlState):
         """Whether an arc may have a centre word across its plane, a zero (I, J and K in all of them)."""
         return True
 
-    def count_in(self, unit: float) -> None:
+    def set_unit(self, unit: float) -> None:
         """Inch or mm comes into force, `unit` in mm.
 
         What a feed from before is then is not known: a rotary axis keeps its degrees, and not every control the rest.

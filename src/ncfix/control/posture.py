@@ -155,6 +155,16 @@ class MachinePosture:
         outer, inner = pointing.columns
         return Postures(pointing, (self.machine[outer], self.machine[inner]), here, ways, at_pole)
 
+    def only_posture(self, direction: Sequence[float], rules: WayRules) -> Postures | None:
+        """The same from wherever the axes may stand; None unless travels leave one way, to the whole turn."""
+        if self.kinematics is None or self.pointing is None or not rules.in_travel:
+            return None
+        outer, inner = (self.kinematics.travel[column] for column in self.pointing.columns)
+        if not np.isfinite([outer, inner]).all():
+            return None
+        one, other = (self.postures(direction, rules, here) for here in zip(outer, inner, strict=True))
+        return one if one and other and one.ways == other.ways and len(one.ways) == 1 else None
+
     def directions(self, position: Vector) -> MachineDirections | None:
         """How the machine stands with its rotary axes at these positions; None if nobody knows its kinematics."""
         if self.kinematics is None or not {X, Y, Z} <= {*self.machine}:

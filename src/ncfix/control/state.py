@@ -382,14 +382,15 @@ class ControlState(ABC):
     ) -> Postures | None:
         """The ways to point the tool along a unit vector in the workpiece.
 
-        None where the kinematics are not known, or those of two rotary axes, or where these stand. `here` says so where
-        the control does not ask.
+        None where the kinematics are not known, or those of two rotary axes, or where these stand, unless there is one
+        way wherever that is. `here` says so where the control does not ask.
         """
         if here is None and self.posture.pointing is not None:
             outer, inner = (self.machine[column] for column in self.posture.pointing.columns)
             self.use_start_positions((outer, inner))
-            if not self.unknown.keys() & {outer, inner}:
-                here = self.position[outer], self.position[inner]
+            if self.unknown.keys() & {outer, inner}:
+                return self.posture.only_posture(direction, rules)
+            here = self.position[outer], self.position[inner]
         return None if here is None else self.posture.postures(direction, rules, here)
 
     def square_to(self, frame: Rotation) -> bool | None:

@@ -75,8 +75,8 @@ CODES = {
     ),
     "NCF616": Code(
         "measured errors look like another unit",
-        "The values are larger than a machine tool's errors in mm can be, or smaller than a laser tells. They are "
-        "given in mm (rotations in rad).",
+        "The values are larger than a machine tool's errors in mm can be, or smaller than a laser tells, or repeats "
+        "agree better than a machine tool comes back. They are given in mm (rotations in rad).",
     ),
     "NCF617": Code(
         "a mistake in a measurement file",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from ncfix.control.moves import Rule
 from ncfix.control.setup import Tool
 from ncfix.diagnostics import SourceError
+from ncfix.machine import loads
 from ncfix_heidenhain.klartext.arc_text import is_relied_on
 from program.klartext.test_following import reasons
 from program.klartext.test_writing import lines
@@ -235,6 +238,27 @@ def test_a_plane_that_turns_axes_from_an_unknown_place_says_why_that_is_unknown(
     body = "L X+0 Y+0 Z+5 FMAX\nL A+0 C+0 FMAX M92\nPLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX\nL X+1 Y+1 Z+0 F100"
     moves = follow(body, "XYZAC").moves
     assert moves.reasons[moves.reason[-1]].startswith("where the axis A stands after M92 depends on its zero point")
+
+
+@pytest.mark.parametrize(
+    ("travel", "sign", "sure"),
+    [("[-100, 170]", "+", True), ("[-200, 200]", "-", False), ("[0, 360]", "+", False), ("[0, 360]", "-", True)],
+)
+def test_where_travel_leaves_one_way_a_plane_turns_axes_from_an_unknown_place(
+    root: Path, travel: str, sign: str, sure: bool
+) -> None:
+    """A+30 C+0 or A-30 C+180; C may have two places for it, a turn apart."""
+    text = (root / "examples/machines/wCAYFXZSt.toml").read_text()
+    machine = loads(re.sub(r"(\[axis.C\]\n.*\n.*\n)", rf"\1range = {travel}\n", text))
+    body = (
+        "L X+0 Y+0 Z+5 FMAX\nL A+0 C+0 FMAX M92\nPLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX SEQ{}\nL X+1 Y+1 Z+0 F100"
+    )
+    assert bool(fixed(body.format(sign), machine).report.refused) is not sure
+
+
+def test_a_scale_that_is_known_at_run_time_is_no_scale_of_zero() -> None:
+    assert "only at run time" in reasons("CYCL DEF 11.0 S\nCYCL DEF 11.1 SCL+Q150\nL X+1 F100")[-1]
+    assert "not above zero" in reasons("CYCL DEF 11.0 S\nCYCL DEF 11.1 SCL0\nL X+1 F100")[-1]
 
 
 def test_m140_beside_words_of_axes() -> None:

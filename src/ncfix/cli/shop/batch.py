@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from ncfix.text.dialect import Dialect
 
 FLATTEN = "--flatten may correct more: it writes out what cycles, loops and subprograms repeat; "
+REPEATED = "NCF433"
+"""Refused since it is executed several times, or for the sake of such a block."""
 STALE = "is of an earlier state of the program, the machine, the set-up or the options, and was left as it is"
 ACCEPT = "--allow-refused writes the program with the refused motions as they were"
 OF_PROGRAMS = 100
@@ -263,8 +265,8 @@ class FixJob:
         if self.verbose:
             console.say(f"  dialect             {fixed.dialect}")
         if refused:
-            flat = self.options.flatten or not entry["moves"]
-            console.say(f"  {ACCEPT if flat else FLATTEN + ACCEPT}")
+            repeated = any(each["code"] == REPEATED or "--flatten" in each["reason"] for each in entry["refused"])
+            console.say(f"  {FLATTEN + ACCEPT if repeated and not self.options.flatten else ACCEPT}")
         code = ExitCode.REFUSED if refused else ExitCode.DONE
         if self.certify and entry["output"] is not None and (fixed.changed or not target.in_place):
             from ncfix.cli.shop.certificates import Proving, certify_output
