@@ -84,10 +84,13 @@ def test_both_lanes_agree(name: str, machine: Machine) -> None:
         ("siemens", "T1 D1\nM6\nOFFN=$AA_IW[X]\nG41 G1 X10 Y10 F100\nX20\nG40 X30\nM30\n", None),
         ("linuxcnc", "T1 M6\nG41 G1 X10 Y10 F100\nX20\nG40 X30\nM2\n", 5.0),
         ("linuxcnc", "T1 M6\nG42.1 D8 G1 X10 Y10 F100\nX20\nG40 X30\nM2\n", -4.0),
+        ("siemens", "T1 D1\nM6\nMIRROR X0\nG41 G1 X10 Y10 F100\nX20\nG40 X30\nM30\n", -5.0),
+        ("siemens", "T1 D1\nM6\nMIRROR X0 Y0\nG41 G1 X10 Y10 F100\nX20\nG40 X30\nM30\n", 5.0),
+        ("fanuc", "G51.1 X0.\nG42 D1 G1 X10. Y10. F100.\nX20.\nG40 X30.\nM30\n", 5.0),
     ],
 )
 def test_the_radius_of_contours(dialect: str, text: str, radius: float | None) -> None:
-    """What contours are offset by is what D, the tool or an allowance says, whichever block says it."""
+    """What contours are offset by is what D, the tool or an allowance says, whichever block says it; mirrored, too."""
     setup = Setup(assume_zero=True, no_point="calculator", tools={1: Tool(100.0, 5.0), 7: Tool(0.0, 6.0)})
     program = read(
         ("G21 G90 G17 G0 X0. Y0. Z9.\n" if dialect != "siemens" else "G0 X0 Y0 Z9\n").encode() + text.encode(),

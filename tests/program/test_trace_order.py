@@ -16,9 +16,10 @@ def test_feed_mode_comes_before_feed() -> None:
 
 
 def test_feed_comes_before_motion_and_units_after_feed() -> None:
-    """F is taken in the unit in force before the block: here mm, though the block switches to inch."""
-    moves = follow("G1 X1 F100 G20").moves
-    assert moves.feed[0] == 100.0
+    """F is taken in the unit in force before the block; what it means once that is inch differs from axis to axis."""
+    moves = follow("G1 X1 F100 G20\nX2 F10").moves
+    assert np.isnan(moves.feed[0])
+    assert moves.feed[1] == 254.0
     assert moves.end[0, 0] == 25.4
 
 

@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import CENTRE_LETTERS, INDEX, LETTERS, X, Y, Z, zeros
-from ncfix.control.frames import WORLD, handed, mirrored, turned_about
+from ncfix.control.frames import WORLD, mirrored, turned_about
 from ncfix_fanuc.macro.control import MacroControl, Scaling
 from ncfix_iso.rs274.cycles import AXES_SAID
 from ncfix_iso.rs274.groups import CONTROL, CUTTER, DISTANCE, FEED_MODE, MOTION, PLANE, RETRACT, SPINDLE_MODE
@@ -142,7 +142,6 @@ def put_up(control: MacroControl) -> None:
         centre[index] = place
     rotation = mirrored("".join(LETTERS[index] for index in control.mirrored))
     control.frames = replace(control.frames, mirror=turned_about(rotation, centre) if control.mirrored else WORLD)
-    control.handedness = handed(rotation)
     turned_back(control)
     control.refresh()
 

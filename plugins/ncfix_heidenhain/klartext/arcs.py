@@ -13,7 +13,6 @@ import math
 from ncfix.control.arcs import CLOCKWISE, COUNTER, Point, centre_from_radius, check_closure, sweep_angle
 from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, dot
 from ncfix.control.expressions import Fault
-from ncfix.control.frames import handed
 from ncfix.control.moves import Arc, Motion, MotionEnd, MotionKind
 from ncfix.values import frozen
 from ncfix_heidenhain.klartext.control import KlartextControl
@@ -167,8 +166,7 @@ def swing(
     """The arc itself; its centre from its start, mm along the axes of the plane, and its signed sweep, rad."""
     axes = step.words.axes | plane.axes
     end = command_of(control, where, axes)
-    hand = handed(control.frames.mirror.rotation)
-    arc = control.circle(plane, centre, hand * sweep)._replace(fixed=step.name == "c")
+    arc = control.circle(plane, centre, control.handedness * sweep)._replace(fixed=step.name == "c")
     control.modal.incremental = step.name in ("ct", "ctp", "cp") or step.words.incremental
     code, why = CLOCKWISE if sweep < 0 else COUNTER, derived(control, step.words, axes)
     control.make(Motion(MotionKind.ARC, axes, end, code, refusal=why, arc=arc))

@@ -10,7 +10,6 @@ import math
 from ncfix.control.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, check_closure, sweep_angle
 from ncfix.control.coordinates import CENTRE_LETTERS, Plane, dot
 from ncfix.control.expressions import Fault
-from ncfix.control.frames import handed
 from ncfix.control.moves import Arc, MotionEnd, MotionKind
 from ncfix_siemens.sinumerik.destination import NO_POLE, destination, doubtful_polar
 from ncfix_siemens.sinumerik.state import Sinumerik
@@ -199,7 +198,7 @@ def circle_of(control: Sinumerik, plane: Plane, centre: Point, sweep: float) -> 
     circle = control.circle(plane, centre, sweep)
     if not control.is_rotated:
         return circle
-    sense = handed(control.rotation)
+    sense = control.handedness
     x, y, z = (sense * value for value in circle.normal)
     return circle._replace(normal=(x, y, z))
 

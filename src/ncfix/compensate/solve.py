@@ -123,8 +123,8 @@ class PrecedingMotion:
 
 
 RELATIVE_CYCLE = (
-    "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended; --flatten writes"
-    " it absolutely"
+    "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended; --flatten"
+    " writes it absolutely"
 )
 NONE: Mapping[int, Reason] = MappingProxyType({})
 CODE_OF_RULE = "NCF432"

@@ -93,7 +93,6 @@ class ProgramControl(ControlState):
     points     a block gave the direction of the tool as a vector
     whole      the motions of the block must not be split, as under cutter compensation
     at_corner  the motion begins or ends at a corner that the control rounds or breaks
-    handedness -1 where coordinates are mirrored, so that arcs turn the other way; else 1
     beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
     block_words  the addresses of the block that is executed, as long as it has made no motion and no setting took them
     """
@@ -120,7 +119,6 @@ class ProgramControl(ControlState):
         self.whole = self.at_corner = False
         self.beside = 0
         self.block_words: Collection[str] = ()
-        self.handedness = 1.0
 
     def lasting(self) -> str | None:
         """All that the control keeps, but for what a `Checkpoint` says, so that it can be compared; None: not said."""
@@ -507,6 +505,11 @@ class ProgramControl(ControlState):
         )
 
     def _beside(self) -> float:
-        """By how much the control offsets the contour to the left of the way, mm; NaN where it is not known."""
+        """By how much the control offsets the contour to the left of the way, mm; NaN where it is not known.
+
+        Where the program's coordinates are mirrored, left of its way is right of that of the tool.
+        """
         radius = self.tool_radius() if self.modal.compensated else 0.0
-        return -radius if self.modal.compensated == RIGHT and not math.isnan(radius) else radius
+        if math.isnan(radius):
+            return radius
+        return (-radius if self.modal.compensated == RIGHT else radius) * self.handedness

@@ -30,7 +30,7 @@ from ncfix.control.coordinates import (
     transposed,
     zeros,
 )
-from ncfix.control.frames import WORLD, FrameStack, mixed_into
+from ncfix.control.frames import WORLD, FrameStack, handed, mixed_into
 from ncfix.control.moves import AT_START, Arc, UnknownAxes
 from ncfix.control.pointing import Pair
 from ncfix.control.posture import NEAREST, SQUARE, MachinePosture, Postures, WayRules, normal_of
@@ -367,6 +367,11 @@ class ControlState(ABC):
         In a turned frame one hides all that it has a part in.
         """
         return mixed_into(unknown, self.inverse) if unknown and self.is_rotated else dict(unknown)
+
+    @property
+    def handedness(self) -> float:
+        """-1 where coordinates are mirrored, so that arcs turn the other way and left is right; else 1."""
+        return handed(self.rotation)
 
     def axes_of(self, lost: UnknownAxes) -> UnknownAxes:
         """Which axes of the machine are not known where this is not known along those of the program's frame."""
