@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect
 from compensate.motions import Arc, motions
+from ncfix.compensate.following import follow
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import carried, matters, signs
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.basis import Backlash
 from ncfix.machine.piecewise import PiecewiseConstant
+from ncfix.text.reader import read
 
 
 def with_play(topology: str) -> Machine:
@@ -74,3 +78,17 @@ def test_with_tcp_the_axes_count_not_the_words() -> None:
     way = intent.direction(np.zeros(4, dtype=np.intp), f)
     np.testing.assert_array_equal(way, expected)
     assert set(way[:, 2].tolist()) == {-1, 1}, "the case has a reversal inside"
+
+
+@pytest.mark.parametrize(("turned", "aside"), [("", 1), ("G68.2 X0. Y0. Z0. I90. J30. K-90.\nG53.1\n", -1)])
+def test_axes_go_out_of_holes_the_way_they_came_in(turned: str, aside: int) -> None:
+    """To the second hole X goes on by 17 mm, down the hole, if the head stands askew, back by 11, and up it again."""
+    machine = with_play("w F X Y Z C B S t")
+    text = f"G21 G90 G94 G17\nG54\nG43 H1\n{turned}G0 X0. Y0. Z50.\nG99 G81 X10. Z-20. R2. F100.\nX20.\nG80\nG1 Y5.\nM30\n"
+    setup = Setup(assume_zero=True, tools={1: Tool(80.0)}, initial=dict.fromkeys("XYZCB", 0.0))
+    intent = Intent(machine, follow(read(text.encode(), "part", "fanuc"), machine, setup).trace.moves, State())
+    assert intent.came is not None
+    assert intent.arrival is not None
+    assert intent.arrival[-2, [0, 2]].tolist() == [aside, -1]
+    assert intent.came[-1, [0, 2]].tolist() == [1, 1]
+    assert intent.arrival[-1].tolist() == [1, 1, 1, 0, intent.came[-1, 4]]

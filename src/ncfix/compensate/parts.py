@@ -327,9 +327,8 @@ class MachineParts(Parts):
         part, direction = continued.part, continued.direction
         head = Part(*last_of(part.program, part.moves), False)
         if self.sided:
-            arrival = continued.intent.arrival
-            assert arrival is not None
-            direction = arrival[-2] if len(arrival) > 1 else direction
+            assert continued.intent.came is not None
+            direction = continued.intent.came[-1]
         return head, direction
 
 

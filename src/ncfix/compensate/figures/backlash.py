@@ -103,9 +103,8 @@ class BacklashBodies:
 
     def came(self, row: int) -> Signs:
         """(n_axes,) the way in which each axis came to the begin of a motion."""
-        assert self.intent.arrival is not None
-        first = np.broadcast_to(np.asarray(self.intent.state.direction, np.int8), self.intent.arrival.shape[1:])
-        return self.intent.arrival[row - 1] if row else first
+        assert self.intent.came is not None
+        return self.intent.came[row]
 
     def _runs(self, axis: int) -> Runs:
         places = self.q[:, :, axis].T.ravel()  # begin and end of each leg in turn: between two, it may have moved, too

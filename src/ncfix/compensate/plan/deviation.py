@@ -205,10 +205,10 @@ def starts_to_check(intent: Intent, unchanged: Mask) -> Mask:
     check_start = np.ones(len(moves), dtype=bool)
     joined = every(moves.start[1:] == moves.end[:-1]) & (moves.tool_length[1:] == moves.tool_length[:-1])
     check_start[1:] = unchanged[:-1] | ~joined
-    if intent.arrival is not None:
+    if intent.came is not None:
         rows = np.arange(1, len(moves))
         now = intent.direction(rows, np.full(len(rows), INSTANT))
-        check_start[1:] |= some(now != intent.arrival[:-1])
+        check_start[1:] |= some(now != intent.came[1:])
     if any(np.ndim(values) for values in intent.state.inputs.values()):
         check_start[:] = True
     return check_start

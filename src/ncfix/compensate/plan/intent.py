@@ -187,16 +187,43 @@ class Intent:
 
     # -- the rest of the state ----------------------------------------------------------------------------------------
 
-    @cached_property
+    @property
+    def came(self) -> Signs | None:
+        """The direction in which each axis comes to the start of each motion, (n, n_axes); None as of `arrival`."""
+        return None if self._directions is None else self._directions[0]
+
+    @property
     def arrival(self) -> Signs | None:
         """The direction in which each axis ends each motion, (n, n_axes); None if no error depends on it."""
+        return None if self._directions is None else self._directions[1]
+
+    @cached_property
+    def _directions(self) -> tuple[Signs, Signs] | None:
+        """Those at the starts and at the ends."""
         if not matters(self.machine):
             return None
         ways = signs(self.moves.end - self.moves.start)
         bent = np.flatnonzero(self.curved)
         ways[bent] = self.heading(bent, np.ones(bent.size))
+        between, holes = np.zeros_like(ways), np.flatnonzero(self.moves.kind == MotionKind.CYCLE)
+        if holes.size:
+            into, out_of = self._drilling(holes)
+            ways[holes] = np.where(into != 0, into, ways[holes])
+            between[holes] = out_of
         came = np.broadcast_to(np.asarray(self.state.direction, dtype=np.int8), ways.shape[1:])
-        return carried(np.vstack((came, ways)))[1:]
+        found = carried(np.vstack((came[None], np.stack((ways, between), axis=1).reshape(-1, ways.shape[1]))))
+        return found[:-1:2], found[1::2]
+
+    def _drilling(self, holes: Index) -> tuple[Signs, Signs]:
+        """Which way axes go into holes (k,), and out of them again, (k, n_axes); 0 where that is not known."""
+        moves, start, end = self.moves, *self.ends
+        after = np.minimum(holes + 1, len(moves) - 1)
+        same = (moves.tcp[after] == moves.tcp[holes]) & (moves.length_under_tcp[after] == moves.length_under_tcp[holes])
+        back = np.where((same & (after > holes))[:, None], signs(start[after] - end[holes]), 0)
+        if moves.approach is None:
+            return -back, back
+        level = self.joints(holes, moves.approach[holes])
+        return np.where(np.isfinite(level), signs(end[holes] - level), -back).astype(np.int8), back
 
     def heading(self, rows: Index, fraction: Array) -> Signs:
         """Which way axes of curved motions go at fractions (k,), (k, n_axes); at a turning point as before it.
@@ -216,7 +243,7 @@ class Intent:
         inside = np.flatnonzero(self.curved[rows] & (fraction < 1))
         if inside.size:
             now = self.heading(rows[inside], fraction[inside])
-            at_start = np.where(rows[inside, None] > 0, self.arrival[rows[inside] - 1], 0)
+            at_start = np.where(rows[inside, None] > 0, self.came[rows[inside]], 0)
             result[inside] = np.where(now != 0, now, at_start)
         return result
 
