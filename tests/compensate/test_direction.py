@@ -35,6 +35,13 @@ def test_the_last_direction_is_kept_at_rest_and_unknown_before_the_first() -> No
     assert carried(signs(motion)).tolist() == [[0, 1], [1, 1], [1, 1], [-1, 1], [-1, 1]]
 
 
+def test_from_where_nobody_knows_an_axis_comes_from_neither_side() -> None:
+    moves = motions(with_play("w F X Y Z t"), (0, 0, 0), [(5, 5, -5), (5, 5, np.nan), (5, 6, 9), (5, 5, 9), (5, 5, 8)])
+    arrival = Intent(with_play("w F X Y Z t"), moves, State()).arrival
+    assert arrival is not None
+    assert arrival[:, 2].tolist() == [-1, 0, 0, 0, -1]
+
+
 def test_the_way_in_which_axes_end_straight_motions() -> None:
     machine = with_play("w F X Y Z t")
     moves = motions(machine, (0, 0, 0), [(5, 0, 0), (5, 5, 0), (2, 5, 0), (2, 5, -1)])

@@ -202,6 +202,7 @@ class Intent:
         """Those at the starts and at the ends."""
         if not matters(self.machine):
             return None
+        lost = ~np.isfinite(self.moves.end - self.moves.start)
         ways = signs(self.moves.end - self.moves.start)
         bent = np.flatnonzero(self.curved)
         ways[bent] = self.heading(bent, np.ones(bent.size))
@@ -211,7 +212,9 @@ class Intent:
             ways[holes] = np.where(into != 0, into, ways[holes])
             between[holes] = out_of
         came = np.broadcast_to(np.asarray(self.state.direction, dtype=np.int8), ways.shape[1:])
-        found = carried(np.vstack((came[None], np.stack((ways, between), axis=1).reshape(-1, ways.shape[1]))))
+        steps = np.stack((ways, between), axis=1).reshape(-1, ways.shape[1])
+        unknown = np.stack((lost, np.zeros_like(lost)), axis=1).reshape(steps.shape)
+        found = carried(np.vstack((came[None], steps)), np.vstack((np.zeros_like(lost[:1]), unknown)))
         return found[:-1:2], found[1::2]
 
     def _drilling(self, holes: Index) -> tuple[Signs, Signs]:

@@ -42,10 +42,13 @@ def signs(motion: Array, rest: float = REST) -> Signs:
     return np.where(np.abs(known) < rest, 0, np.sign(known)).astype(np.int8)
 
 
-def carried(directions: Signs) -> Signs:
-    """Each axis's last direction that is not 0, row after row; 0 before its first motion. Shape (n, n_axes)."""
-    rows = np.arange(len(directions))[:, None]
-    last = np.maximum.accumulate(np.where(directions != 0, rows, 0), axis=0)
+def carried(directions: Signs, lost: Mask | None = None) -> Signs:
+    """Each axis's last direction that is not 0, row after row; 0 before its first motion. Shape (n, n_axes).
+
+    lost  (n, n_axes) where the direction is not known any more; 0 from there on
+    """
+    rows, moved = np.arange(len(directions))[:, None], directions != 0
+    last = np.maximum.accumulate(np.where(moved if lost is None else moved | lost, rows, 0), axis=0)
     return np.take_along_axis(directions, last, axis=0)
 
 
