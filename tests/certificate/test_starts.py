@@ -46,6 +46,13 @@ def test_an_arc_that_ends_where_an_axis_turns_round_is_not_called_faulty() -> No
     assert proof_of(text, "play", {"X": 0.0, "Y": 0.0, "Z": 200.0}).faults == []
 
 
+def test_an_axis_with_play_comes_out_of_a_hole_the_other_way_than_it_went_in() -> None:
+    text = b"G21 G90 G17\nG0 X1. Y1. Z20.\nG99 G81 X10. Y5. Z-4. R2. F100.\nX20.\nG80\nG1 X30.\nY9.\nM30\n"
+    proof = proof_of(text, "play", {"X": 0.0, "Y": 0.0, "Z": 200.0}, "iso")
+    assert proof.faults == []
+    assert proof.proved_motions >= 4
+
+
 def test_where_a_cycle_goes_back_to_is_not_guessed() -> None:
     text = b"G21 G90 G17\nG0 X0 Y0 Z20\n%sG81 X10 Y5 Z-4 R2 F100\nX20\nG80\nG1 X0\nM2\n"
     assert proof_of(text % b"", "table", {}).reasons["where an axis stands is not known"] == 1

@@ -91,7 +91,9 @@ def test_with_tcp_the_axes_count_not_the_words() -> None:
 def test_axes_go_out_of_holes_the_way_they_came_in(turned: str, aside: int) -> None:
     """To the second hole X goes on by 17 mm, down the hole, if the head stands askew, back by 11, and up it again."""
     machine = with_play("w F X Y Z C B S t")
-    text = f"G21 G90 G94 G17\nG54\nG43 H1\n{turned}G0 X0. Y0. Z50.\nG99 G81 X10. Z-20. R2. F100.\nX20.\nG80\nG1 Y5.\nM30\n"
+    text = (
+        f"G21 G90 G94 G17\nG54\nG43 H1\n{turned}G0 X0. Y0. Z50.\nG99 G81 X10. Z-20. R2. F100.\nX20.\nG80\nG1 Y5.\nM30\n"
+    )
     setup = Setup(assume_zero=True, tools={1: Tool(80.0)}, initial=dict.fromkeys("XYZCB", 0.0))
     intent = Intent(machine, follow(read(text.encode(), "part", "fanuc"), machine, setup).trace.moves, State())
     assert intent.came is not None

@@ -105,6 +105,15 @@ class Expected:
             clear[part] = np.isfinite(way) & same  # and it does not turn round at the end
         lost = np.ones(n, dtype=bool)
         lost[known] = False
+        goes_on = ~lost[:-1] & ~lost[1:] & (~ours.tcp[:-1] | (ours.length[:-1] == ours.length[1:]))
+        hole = np.flatnonzero((ours.kind[:-1] == Kind.HOLE) & goes_on)
+        level, bottom = (
+            model.joints(model.internal(places), ours.tcp[hole], np.nan_to_num(ours.length[hole]))
+            for places in (ours.start[hole + 1], ours.end[hole])
+        )
+        out = np.where(np.abs(level - bottom) > 1e-9, np.sign(level - bottom), 0)
+        signs[hole] = np.where(out != 0, -out, signs[hole])
+        signs[hole + 1] = np.where(signs[hole + 1] != 0, signs[hole + 1], out)
         lost |= ours.tcp != np.concatenate([[False], ours.tcp[:-1]])
         moves, index = (signs != 0) & ~lost[:, None], np.arange(n)[:, None]
         last = np.maximum.accumulate(np.where(moves | lost[:, None], index, -1), axis=0)

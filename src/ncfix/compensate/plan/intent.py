@@ -240,14 +240,14 @@ class Intent:
 
     def direction(self, rows: Index, fraction: Array) -> Signs:
         """The direction of each axis at fractions of motions, (k, n_axes); zeros (n_axes,) if it does not matter."""
-        if self.arrival is None:
+        if self._directions is None:
             return np.zeros(len(self.machine.axes), dtype=np.int8)
-        result = self.arrival[rows]
+        came, arrival = self._directions
+        result = arrival[rows]
         inside = np.flatnonzero(self.curved[rows] & (fraction < 1))
         if inside.size:
             now = self.heading(rows[inside], fraction[inside])
-            at_start = np.where(rows[inside, None] > 0, self.came[rows[inside]], 0)
-            result[inside] = np.where(now != 0, now, at_start)
+            result[inside] = np.where(now != 0, now, came[rows[inside]])
         return result
 
     def states(self, rows: Index, fraction: Array) -> State:
