@@ -22,12 +22,10 @@ from numpy.typing import NDArray
 
 from ncfix.control.builder import MotionBuilder, MotionStyle
 from ncfix.control.coordinates import LETTERS, Vector, mask_of, rotated
-from ncfix.control.expressions import Unknown, Value
 from ncfix.control.flow import BlockBudget
 from ncfix.control.moves import (
     AT_START,
     PASS_RULES,
-    FeedMode,
     Motion,
     MotionEnd,
     MotionKind,
@@ -79,7 +77,6 @@ class ProgramControl(ControlState):
     """What every control keeps while it follows a program, whatever its language; its motions go to `builder`.
 
     budget     how much may still be executed
-    unit_said  the program has said whether it is in inches or millimetres, by `unit_codes`
     needs_feed a motion at feed is an error where no feed is set
     refusal    why every motion from here on is refused; empty while all is well
     suspended  the same, for as long as a code is in force: what suspends them -> why
@@ -103,7 +100,7 @@ class ProgramControl(ControlState):
         super().__init__(run, dialect)
         self.builder = MotionBuilder(run.axes, run.rotary)
         self.budget = BlockBudget(run.setup.most_blocks, run.setup.most_blocks)
-        self.unit_said = self.needs_feed = False
+        self.needs_feed = False
         self.refusal = ""
         self.suspended: dict[str, str] = {}
         self.followed: set[str] = set()
@@ -150,25 +147,6 @@ class ProgramControl(ControlState):
     def takes_zero_across(self) -> bool:
         """Whether an arc may have a centre word across its plane, a zero (I, J and K in all of them)."""
         return True
-
-    def set_unit(self, unit: float) -> None:
-        """Inch or mm comes into force, `unit` in mm.
-
-        What a feed from before is then is not known: a rotary axis keeps its degrees, and not every control the rest.
-        """
-        modal = self.modal
-        if unit != modal.unit and modal.feed_mode != FeedMode.INVERSE_TIME:
-            modal.feed = math.nan
-        self.unit_said, modal.unit = True, unit
-        self.refresh()
-
-    @property
-    def feed_in_force(self) -> Value:
-        """The number of the F in force; zero without one."""
-        modal = self.modal
-        if math.isnan(modal.feed):
-            return Unknown("F") if modal.feed_given else 0.0
-        return modal.feed / (1.0 if modal.feed_mode == FeedMode.INVERSE_TIME else modal.unit)
 
     def moves(self) -> Moves:
         """The motions so far."""

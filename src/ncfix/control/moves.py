@@ -240,11 +240,8 @@ class Moves:
     @property
     def length_under_tcp(self) -> NDArray[np.float64]:
         """(n,) mm, the length of tool that the control has X Y Z of under TCP."""
-        return (
-            self.tool_length
-            if self.tcp_length is None
-            else np.where(np.isnan(self.tcp_length), self.tool_length, self.tcp_length)
-        )
+        own = self.tcp_length
+        return self.tool_length if own is None else np.where(np.isnan(own), self.tool_length, own)
 
     @property
     def beside_tip(self) -> NDArray[np.bool_]:
@@ -267,7 +264,7 @@ class Moves:
         """(n, n_axes) axes that no correction moves: those without words, and rotary axes that get none here."""
         if self.words_alone_turn is None:
             return self.wordless
-        rests = self.words_alone_turn & ~(self.programmed & self.rotary).any(axis=1)
+        rests = self.words_alone_turn & ~self.programmed[:, self.rotary].any(axis=1)
         return self.wordless | (self.rotary & rests[:, None])
 
     @property

@@ -30,8 +30,9 @@ from ncfix.control.coordinates import (
     transposed,
     zeros,
 )
+from ncfix.control.expressions import Unknown, Value
 from ncfix.control.frames import WORLD, FrameStack, handed, mixed_into
-from ncfix.control.moves import AT_START, Arc, UnknownAxes
+from ncfix.control.moves import AT_START, Arc, FeedMode, UnknownAxes
 from ncfix.control.pointing import Pair
 from ncfix.control.posture import NEAREST, SQUARE, MachinePosture, Postures, WayRules, normal_of
 from ncfix.control.setup import Run, SetupLookup
@@ -173,6 +174,7 @@ class ControlState(ABC):
     places     which axes the program itself has brought to where they stand
     knowledge  what was asked of the setup, and what it does not give
     offset_checked  it has been asked for the work offset in force
+    unit_said  the program has said whether it is in inches or millimetres, by `unit_codes`
     tcp        X Y Z are those of the tip (tool-centre-point control)
     tilted     a tilted plane is in force, in which they are
     switches   the switches of block delete that have been asked, where that matters to the path
@@ -206,7 +208,7 @@ class ControlState(ABC):
         self.tcp = run.setup.tcp
         self.frame_unknown: UnknownAxes | None = None
         self.locate: Callable[[], Place] = lambda: Place("")
-        self.offset_checked = False
+        self.offset_checked = self.unit_said = False
         self._frame = -1
         given = () if run.setup.assume_zero else run.setup.initial
         self.places = Places(mask_of(INDEX[axis] for axis in run.axes if axis not in given))
@@ -241,6 +243,25 @@ class ControlState(ABC):
         hint = "--block-skip off: they are executed" if deleted else "--block-skip on: they are skipped"
         self.warn(BLOCK_DELETE, f"blocks with {name} are taken as {told}", hint)
         return deleted
+
+    def set_unit(self, unit: float) -> None:
+        """Inch or mm comes into force, `unit` in mm.
+
+        What a feed from before is then is not known: a rotary axis keeps its degrees, and not every control the rest.
+        """
+        modal = self.modal
+        if unit != modal.unit and modal.feed_mode != FeedMode.INVERSE_TIME:
+            modal.feed = math.nan
+        self.unit_said, modal.unit = True, unit
+        self.refresh()
+
+    @property
+    def feed_in_force(self) -> Value:
+        """The number of the F in force; zero without one."""
+        modal = self.modal
+        if math.isnan(modal.feed):
+            return Unknown("F") if modal.feed_given else 0.0
+        return modal.feed / (1.0 if modal.feed_mode == FeedMode.INVERSE_TIME else modal.unit)
 
     # -- frames -------------------------------------------------------------------------------------------------------
 
