@@ -54,6 +54,7 @@ class Writer:
 
     numbered  every block has its number
     frame     "turned" or "tilted": now and then the coordinates are turned in their plane, or a plane is tilted
+    formulas  some words are formulas of a variable
     """
 
     language: str
@@ -63,6 +64,7 @@ class Writer:
     at: dict[str, float]
     lines: list[str]
     frame: str = ""
+    formulas: bool = False
 
     @property
     def klartext(self) -> bool:
@@ -78,10 +80,24 @@ class Writer:
 
     def word(self, axis: str, value: float) -> str:
         self.at[axis] = round(value, 3)
+        if self.formulas and self.rng.random() < 0.2:
+            return self.formula(axis, self.at[axis])
         digits = f"{self.at[axis]:+.3f}" if self.klartext else f"{self.at[axis]:.3f}"
         if not self.klartext and self.rng.random() < 0.2 and "." in digits:
             digits = digits.rstrip("0")
         return axis + digits
+
+    def formula(self, axis: str, value: float) -> str:
+        """A word that has a variable in it, which the head of the program has given the value 12.5."""
+        more, half = f"{value - 12.5:+.3f}", f"{value - 6.25:+.3f}"
+        if self.klartext:
+            sign = self.rng.choice("+-")
+            text = f"Q1 {more[0]} {more[1:]}" if self.rng.random() < 0.5 else f"( Q1 / 2 ) {half[0]} {half[1:]}"
+            self.put(f"Q2 = {text}" if sign == "+" else f"FN 2: Q2 = {-value + 12.5:+.3f} - +Q1")
+            return f"{axis}{sign}Q2"
+        if self.language == "siemens":
+            return self.rng.choice((f"{axis}=R1{more}", f"{axis}=(R1/2){half}"))
+        return self.rng.choice((f"{axis}[#101{more}]", f"{axis}[[#101/2]{half}]", f"{axis}[{value}]"))
 
     def motion(self, rapid: bool, axes: str, feed: str = "") -> None:
         words = " ".join(self.word(axis, self.place(axis)) for axis in axes)
@@ -246,6 +262,8 @@ class Writer:
                 rotary = " A0. C0." if self.five else ""
                 self.put(f"G0 X0. Y0.{rotary}")
                 self.put(f"{lead} H1 Z200.")
+        if self.formulas:
+            self.put({"heidenhain": "FN 0: Q1 = +12.5", "siemens": "R1=12.5"}.get(self.language, "#101=[25./2.]"))
         self.at.update(X=0.0, Y=0.0, Z=200.0, A=0.0, C=0.0)
 
 
@@ -270,7 +288,8 @@ def cases(count: int, seed: int) -> Iterator[Case]:
         numbered = rng.random() < 0.6
         turns = {"linuxcnc": ("",), "iso": ("", "turned")}.get(language, ("", "turned", "tilted"))
         frame = "" if five or rng.random() < 0.6 else rng.choice(turns)
-        writer = Writer(language, rng, numbered, five, {}, [], frame)
+        formulas = language != "iso" and rng.random() < 0.3
+        writer = Writer(language, rng, numbered, five, {}, [], frame, formulas)
         original = writer.program(rng.randint(8, 40))
         known = machines[five or frame == "tilted"]
         program = read(original, "part", get(language))

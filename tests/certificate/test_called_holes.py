@@ -121,11 +121,16 @@ def test_a_call_says_where_its_hole_ends(call: str, bottom: float | None) -> Non
     assert (None if found is None else found.bottom) == bottom
 
 
-def test_parameters_are_known_where_they_get_plain_numbers() -> None:
+def test_parameters_are_known_where_they_get_known_numbers() -> None:
     parameters: dict[str, float | None] = {}
-    for line in ("CYCL DEF 200 DRILLING Q200=+2 Q201=-20,5 Q203=+1 ~", "Q204=+Q9 ;CLEARANCE", "FN 0: Q200 = +3 * +2"):
+    for line in (
+        "CYCL DEF 200 DRILLING Q200=+2 Q201=-20,5 Q203=+1 ~",
+        "Q204=+Q9 ;CLEARANCE",
+        "Q200 = +3 * +2",
+        "Q100=+1",
+    ):
         assign(line, parameters)
-    assert parameters == {"Q200": None, "Q201": -20.5, "Q203": 1.0, "Q204": None}
+    assert parameters == {"Q200": 6.0, "Q201": -20.5, "Q203": 1.0, "Q204": None, "Q100": None}
     assign("FN 1: Q203 = +Q203 + -0.25", parameters)
     assert parameters["Q203"] == 0.75
     assign("FN 2: Q203 = +Q203 - -0.25", parameters)

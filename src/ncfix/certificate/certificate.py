@@ -102,7 +102,8 @@ def said(certificate: Mapping[str, Any]) -> Iterator[str]:
         f"{certificate['proved_motions']} of the {motions} with motions"
     )
     if certificate["not_proved"]:
-        yield "  not proved"
+        left = sum(each["blocks"] for each in certificate["not_proved"])
+        yield f"  not proved          {left}: the second reader cannot judge them; that is no fault"
         for each in certificate["not_proved"]:
             lines = " ".join(map(str, each["lines"]))
             more = " ..." if each["blocks"] > len(each["lines"]) else ""

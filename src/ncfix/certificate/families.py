@@ -14,6 +14,7 @@ from ncfix.certificate.following import (
     AxisFollower,
     Given,
 )
+from ncfix.certificate.formulas import value_of, variable_name
 from ncfix.certificate.holes import HoleCall
 from ncfix.certificate.klartext import KlartextFollower
 from ncfix.certificate.model import TipModel
@@ -32,19 +33,14 @@ WORDS_QUIET = re.compile(
 )
 """Words of SINUMERIK that move nothing and change no coordinates."""
 DECLARES = frozenset(("DEF", "EXTERN"))
+OF_THE_CONTROL = 2000
+"""Numbers of variables from which on they may be offsets or positions."""
 SINGLE = frozenset("GNFSTDMHPLEQO")
 """Letters whose words are seen to, or mean nothing here."""
 
 
 class WordAddressFollower(AxisFollower):
-    """Follows word addresses and SINUMERIK.
-
-    variables  of SINUMERIK, with plain numbers that the program gave them
-    """
-
-    def __init__(self, axes: Sequence[str], family: Family, given: Given, model: TipModel | None) -> None:
-        super().__init__(axes, family, given, model)
-        self.variables: dict[str, float | None] = {}
+    """Follows word addresses and SINUMERIK."""
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
@@ -54,6 +50,12 @@ class WordAddressFollower(AxisFollower):
             for word in line.codes:
                 if re.fullmatch(CYCLE_CALL, word.name):
                     return self._call(row, line, word.name)
+        elif line.codes and line.codes[-1].name.startswith("#"):
+            self._give(line.codes[-1])
+            return None
+        if line.odd and "=" in line.rest:
+            self.variables.clear()
+        line = self.settled(line)
         codes = [round(10 * word.value) for word in line.codes if word.name == "G" and word.value is not None]
         if line.odd and (codes or line.path):
             self.lost["odd"] = line.odd
@@ -106,6 +108,13 @@ class WordAddressFollower(AxisFollower):
             step.foreign = True
             return step
         return self.called_hole(row, line, self.target({k: v for k, v in words.items() if k in self.at}), call)
+
+    def _give(self, word: TextWord) -> None:
+        """A variable gets a value; with a high number it is one of the control."""
+        name = variable_name(word.name)
+        self.variables[name] = value_of(word.number, self.variables)
+        if name[1:].isdecimal() and int(name[1:]) >= OF_THE_CONTROL:
+            self.lost["variable"] = "a variable of the control gets a value"
 
     def _smooths(self, line: TextLine, codes: Sequence[int]) -> bool:
         """Whether a line does nothing but say how the control smooths the path, and for which axes (G5.1 Q2 X0 Y0)."""
@@ -393,7 +402,8 @@ class WordAddressFollower(AxisFollower):
 
     def _sinumerik_word(self, word: TextWord) -> None:
         """A variable that gets a value, or a word that does something."""
-        self.variables[word.name] = word.value
+        known = self.variables
+        known[word.name] = value_of(word.number, known) if word.value is None and word.number else word.value
         name = word.name.partition("(")[0].strip()
         if not word.number and not WORDS_QUIET.fullmatch(name) and not name.startswith(("%", "_N_", "$")):
             self.lost[name] = f"{name} is not known to this reader"
@@ -421,9 +431,6 @@ class WordAddressFollower(AxisFollower):
     def _fixed(self, row: int, line: TextLine, words: Mapping[str, TextWord], codes: Sequence[int]) -> AxisStep:
         """A motion in machine coordinates, or to a reference point."""
         named = {axis: word for axis, word in words.items() if axis in self.at}
-        for axis, word in named.items():
-            if word.value is None:  # a variable, which may be known
-                named[axis] = word._replace(value=self.variables.get(word.number.upper()))
         if 280 in codes or 300 in codes:
             point = self.given.references.get("G28" if 280 in codes else "G30", {})
             end = dict(self.at)

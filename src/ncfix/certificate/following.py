@@ -15,6 +15,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.certificate.formulas import value_of
 from ncfix.certificate.holes import HoleCall
 from ncfix.certificate.model import TipModel
 from ncfix.certificate.reading import AXES, JUMPS, Family, TextLine, TextWord
@@ -126,6 +127,8 @@ class AxisFollower:
         """What the program itself adds to the numbers of axes, mm or degree: G92, TRANS."""
         self.local: dict[str, float] = {}
         """The same by G52."""
+        self.variables: dict[str, float | None] = {}
+        """What the program has given variables and parameters; None: not known."""
         self.lost: dict[str, str] = {}
         self.foreign: set[int] = set()
         """Lines that a correction may rewrite otherwise."""
@@ -343,6 +346,19 @@ class AxisFollower:
             return dict.fromkeys(turning, NAN)
         found = way.to(rotation[:, 2], here, sense=sense, sign=sign, inside=inside, stays=stays)
         return dict(zip(turning, [NAN, NAN] if found is None else np.degrees(found).tolist(), strict=True))
+
+    def settled(self, line: TextLine) -> TextLine:
+        """A line whose words have the values of their formulas, where the variables in them are known."""
+        if line.plain or all(word.value is not None for word in line.path):
+            return line
+        given_here = {word.name for word in line.codes}  # which of both values counts is not sure
+        known = {name: value for name, value in self.variables.items() if name not in given_here}
+        values = (word.value if word.value is not None else value_of(word.number, known) for word in line.path)
+        path = [
+            word if word.value == value else word._replace(number="", value=value)
+            for word, value in zip(line.path, values, strict=True)
+        ]
+        return replace(line, path=path)
 
     def scale(self, axis: str) -> float:
         """Mm, or degree, in a unit of the words of an axis."""

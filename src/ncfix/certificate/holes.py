@@ -12,6 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from ncfix.certificate.formulas import value_of
 from ncfix.certificate.reading import CYCLE_CALL, DECIMAL, Family, TextLine
 from ncfix.certificate.steps import NAN
 
@@ -25,6 +26,10 @@ FIRST_DEPTH = {83: {5: 1, 6: -1}}
 ADDED = re.compile(rf"FN ?([12]): ?(Q203) ?= ?\+?\2 ?([+-]) ?({DECIMAL})", re.IGNORECASE)
 ASSIGNED = re.compile(rf"(?<!\w)(Q\d+) ?= ?(?:({DECIMAL})(?=[ \t]*(?:~|$|Q\d+ ?=)))?", re.IGNORECASE)
 """A Q parameter that gets a value, and that value if it is a plain number."""
+FORMULA = re.compile(r"(?:FN ?[0-7] ?: ?)?(Q[LR]?\d+) ?= ?([^=]+)", re.IGNORECASE)
+"""A Q parameter that gets the value of a formula."""
+BUSY = re.compile(r"Q1\d\d")
+"""Q parameters to which the control itself gives values."""
 CALLS = {
     Family.SINUMERIK: re.compile(rf"[ \t]*(?:\bMCALL\b(?:[ \t]*{CYCLE_CALL})?|{CYCLE_CALL})", re.IGNORECASE),
     Family.KLARTEXT: re.compile(rf"[ \t]*(?:CYCL CALL(?![ \t]*\w)|{ADDED.pattern}(?=[ \t]*$)|\bM99\b)", re.IGNORECASE),
@@ -92,15 +97,18 @@ class HoleCall(NamedTuple):
 
 
 def assign(text: str, parameters: dict[str, float | None]) -> None:
-    """Take in what a line of Klartext says of Q parameters: plain numbers, and what is added to Q203; else nothing is
-    known of them."""
-    code = text.partition(";")[0]
-    if found := ADDED.match(code.strip()):
+    """Take in what a line of Klartext says of Q parameters; of those whose value is not known it takes in that."""
+    code = text.partition(";")[0].strip(" \t~")
+    if found := ADDED.match(code):
         before, change = parameters.get("Q203"), float(found[4].replace(",", "."))
         if (found[1] == "1") != (found[3] == "+") or before is None:
             parameters["Q203"] = None
         else:
             parameters["Q203"] = before + (change if found[1] == "1" else -change)
+        return
+    if found := FORMULA.fullmatch(code):
+        formula = found[2].replace(",", ".").replace("DIV", "/")
+        parameters[found[1].upper()] = None if BUSY.fullmatch(found[1]) else value_of(formula, parameters)
         return
     for name, number in ASSIGNED.findall(code):
         parameters[name.upper()] = float(number.replace(",", ".")) if number else None

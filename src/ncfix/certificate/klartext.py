@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 
 import numpy as np
 
-from ncfix.certificate.following import INCH, NO_POLE, AxisFollower, Given
+from ncfix.certificate.following import INCH, NO_POLE, AxisFollower
 from ncfix.certificate.holes import HoleCall, assign
-from ncfix.certificate.model import TipModel
-from ncfix.certificate.reading import AXES, RETRACTS, Family, TextLine, TextWord
+from ncfix.certificate.reading import AXES, RETRACTS, TextLine, TextWord
 from ncfix.certificate.steps import NAN, AxisStep, Kind
 from ncfix.certificate.turning import PlaneBlock, about
 
@@ -39,18 +37,11 @@ class KlartextFollower(AxisFollower):
     datum     CYCL DEF 247 has begun, and its number is still to come
     drilling  which cycle for holes is defined
     oversize  mm, what the last tool call adds to the length of the tool (DL)
-    worked_out  Q120 to Q122, the positions of A, B and C for the last plane, degrees
     """
 
     datum = False
     drilling = 0
     oversize = 0.0
-
-    def __init__(self, axes: Sequence[str], family: Family, given: Given, model: TipModel | None) -> None:
-        super().__init__(axes, family, given, model)
-        self.worked_out: dict[str, float] = {}
-        self.parameters: dict[str, float | None] = {}
-        """Q parameters that got plain numbers; None for those that got others."""
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
@@ -64,8 +55,7 @@ class KlartextFollower(AxisFollower):
         if self._took_statement(lead):
             return None
         self._klartext_words(line)
-        if any(word.value is None for word in line.path):
-            line = replace(line, path=[self._settled(word) for word in line.path])
+        line = self.settled(line)
         words = {word.name: word for word in line.path if word.name in AXES}
         if lead == "CC":
             self._set_pole(words)
@@ -121,19 +111,12 @@ class KlartextFollower(AxisFollower):
         elif lead.startswith(("CYCL DEF 2", "FN", "Q")):
             if found := HOLES.match(lead):
                 self.drilling = int(found[1])
-            assign(lead, self.parameters)
+            assign(lead, self.variables)
         else:
             return lead.startswith(
                 ("BLK FORM", "END PGM", "TOOL DEF", "LBL ", "CYCL DEF 32", "CYCL DEF 7.0", "CYCL DEF 10.0")
             )
         return True
-
-    def _settled(self, word: TextWord) -> TextWord:
-        """A word whose value is a position that the control has worked out, if that is known."""
-        known = self.worked_out.get(word.number.lstrip("+-").upper())
-        if word.value is not None or known is None:
-            return word
-        return word._replace(value=-known if word.number.startswith("-") else known)
 
     def _tilt(self, lead: str) -> None:
         """PLANE SPATIAL or RESET: into a tilted plane, or out of it; with TURN and MOVE the rotary axes turn."""
@@ -151,7 +134,7 @@ class KlartextFollower(AxisFollower):
         if home or around:
             unshifted = home and not any(self.offset(axis) for axis in turning)
             way = dict.fromkeys(turning, 0.0 if unshifted else NAN)
-        self.worked_out = {f"Q{120 + 'ABC'.index(axis)}": value for axis, value in way.items()}
+        self.variables |= {f"Q{120 + 'ABC'.index(axis)}": value for axis, value in way.items()}
         if plane.rotation is None:
             self.end_turn()
         else:
@@ -236,7 +219,7 @@ class KlartextFollower(AxisFollower):
 
     def _hole(self, row: int, line: TextLine, over: dict[str, float]) -> AxisStep:
         """The cycle that is defined, over a place."""
-        call = HoleCall.of_parameters(self.drilling, self.parameters)
+        call = HoleCall.of_parameters(self.drilling, self.variables)
         step = self.called_hole(row, line, over, call)
         if not self.drilling or math.isnan(call.bottom):
             step.why, step.foreign = step.why or "a drilling cycle that this reader does not know", True

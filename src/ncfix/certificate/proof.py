@@ -107,8 +107,8 @@ class Prover(Deviations):
         """Compare all blocks."""
         self._stamps()
         for fault in pairing.faults:
-            if self._foreign_near(fault, pairing):
-                self.proof.leave(UNSURE, fault.original or fault.line)
+            if near := self._foreign_near(fault, pairing):
+                self.proof.leave(UNSURE, near)
             else:
                 self.proof.fault(*fault)
         pairs = pairing.pairs.columns
@@ -130,7 +130,7 @@ class Prover(Deviations):
             self.proof.blocks += 1
             step = self.ours.get(pair.row)
             self.proof.motions += step is not None
-            if line.number in self.proof.faulty:
+            if line.number in self.proof.faulty or line.number in self.proof.left:
                 continue
             if step is None:
                 if line.odd and self._changed(pair):
@@ -167,7 +167,7 @@ class Prover(Deviations):
         found[found] = known[ours.at[row[found]]]
         for rows in (self.foreign, unsure):
             found &= ~np.isin(row, list(rows))
-        found &= ~np.isin(self.first.numbers[row], list(self.proof.faulty))
+        found &= ~np.isin(self.first.numbers[row], [*self.proof.faulty, *self.proof.left])
         where = np.flatnonzero(found)
         found[where] = same_but_axes(first, row[where], second, at[where])
         return found
@@ -198,14 +198,14 @@ class Prover(Deviations):
         for text in faults:
             self.proof.fault(text, line, number)
 
-    def _foreign_near(self, fault: BlockFault, pairing: Pairing) -> bool:
-        """Whether what is wrong with lines may be due to what this reader does not know."""
+    def _foreign_near(self, fault: BlockFault, pairing: Pairing) -> int:
+        """The original line at which lines are wrong, if that may be due to what this reader does not know; else 0."""
         row = fault.original - 1
         if not fault.original:
             rows, _, last = pairing.pairs.columns.T
             row = int(rows[self.second.numbers[last] < fault.line].max(initial=0))
         near = range(max(row - 2, 0), min(row + 3, len(self.first.lines)))
-        return any(self._is_foreign(at) or (at in self.ours and bool(self.ours[at].why)) for at in near)
+        return (row + 1) * any(self._is_foreign(at) or (at in self.ours and bool(self.ours[at].why)) for at in near)
 
     def _is_foreign(self, row: int) -> bool:
         step = self.ours.get(row)

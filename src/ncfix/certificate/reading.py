@@ -50,8 +50,8 @@ class TextWord(NamedTuple):
 
     @property
     def decimals(self) -> int:
-        """Digits behind the point."""
-        return len(self.number.replace(",", ".").partition(".")[2])
+        """Digits behind the point; a formula has more than a control takes."""
+        return 99 if self.value is None else len(self.number.replace(",", ".").partition(".")[2])
 
 
 @mutable
@@ -107,6 +107,12 @@ FLOW = re.compile(
     r"\b(?:GOTO|IF|WHILE|END|THEN|DO)\d*\b|\bO[ \t]*(?:<|\d+[ \t]*(?:SUB|CALL|IF|WHILE|DO|REPEAT|END|ELSE|R))"
 )
 PATH_WORDS = AXES | frozenset("IJKR")
+ASSIGNMENT = re.compile(
+    r"[ \t]*(?:/\d?[ \t]*)?(?:N[ \t]*\d+[ \t]*)?(?:/\d?[ \t]*)?(\#\d+|\#<[^<>]*>)[ \t]*="
+    r"((?:[^=();<>A-Z]|<[^<>=()]*>|[A-Z]{2,})+)(?:\([^()]*\)[ \t]*)*(?:;.*)?",
+    re.IGNORECASE,
+)
+"""A line that gives a variable the value of a formula, and does nothing else."""
 
 
 class _Rest:
@@ -141,6 +147,11 @@ def _marked(number: int, text: str) -> tuple[TextLine, int]:
 
 def _word_address(number: int, text: str) -> TextLine:
     line, marked = _marked(number, text)
+    flows = FLOW.search(text.upper())
+    if "=" in text and not flows and (found := ASSIGNMENT.fullmatch(text)):
+        line.codes.append(TextWord(found[1], found[2].strip(), None))
+        line.rest = text
+        return line
     rest = _Rest(text)
     for found in WORD_ADDRESS.finditer(text):
         start, end = found.span()
@@ -157,7 +168,7 @@ def _word_address(number: int, text: str) -> TextLine:
                 continue
             line.codes.append(word)
     line.rest = str(rest)
-    if line.odd and FLOW.search(text.upper()):
+    if line.odd and flows:
         line.odd = JUMPS
     return line
 
@@ -221,7 +232,7 @@ def _sinumerik(number: int, text: str) -> TextLine:
 DECIMAL = r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)"
 KLARTEXT_WORD = re.compile(
     rf"(;.*)|(R0|RL|RR|FMAX|F ?AUTO|DR[+-])(?![\w.,])"
-    rf"|(I?(?:[XYZABCUVW]|P[AR])|[NT][XYZ]|R|FQ?|LA|M|S)({DECIMAL}|[+-]?Q12[0-2])(?![\w.,])"
+    rf"|(I?(?:[XYZABCUVW]|P[AR])|[NT][XYZ]|R|FQ?|LA|M|S)({DECIMAL}|[+-]?Q[LR]?\d+)(?![\w.,])"
     rf"|([A-Z]+)|([^ \t])",
     re.IGNORECASE,
 )
