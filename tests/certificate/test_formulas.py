@@ -1,4 +1,4 @@
-"""The second reader works out formulas of known values itself, and gives those no value that controls take differently."""
+"""The second reader works out formulas of known values; those that controls take differently get none."""
 
 from __future__ import annotations
 

@@ -182,7 +182,7 @@ def _has_unnamed(folder: str) -> bool:
 @click.command()
 @json_option
 def doctor(as_json: bool) -> int:
-    """Look at this computer as ncfix does: packages, plugins, the compiled core, caches.
+    """Check the installation: packages, plugins, the compiled core, caches.
 
     Exit code 1 if something is wrong.
     """

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 BATCHES = "ncfix.batches"
 """Where a context keeps the batches of the groups of programs before this one."""
 AUTO = 0
-"""`--jobs auto` as a number: as many as pay."""
+"""`--jobs auto` as a number: as many as help."""
 PAYS_BYTES = 8 << 20
 """One process more pays for each so much text: starting it costs a tenth of what correcting this text takes."""
 PAYS_PROGRAMS = 8
@@ -60,7 +60,7 @@ class Jobs(click.IntRange):
 
 
 def workers_for(jobs: int, programs: Sequence[OutputTarget], executor: str) -> int:
-    """How many workers these programs get: what was asked for, or as many as pay, at most one a processor.
+    """How many workers these programs get: what was asked for, or as many as help, at most one a processor.
 
     For a cluster there are two at least: one alone would be this process.
     """
@@ -109,9 +109,9 @@ def _executors() -> Iterable[str]:
 )
 @click.option("--in-place", is_flag=True, help="Put the result in PROGRAM's place and keep that as PROGRAM.orig.")
 @click.option(
-    "--force", is_flag=True, help="Replace an output; correct a stamped program; take a machine that cannot be."
+    "--force", is_flag=True, help="Replace an output; correct a stamped program; accept impossible values of a machine."
 )
-@click.option("--resume", is_flag=True, help="Go on with a batch: what is done in -o DIR and has not changed stays.")
+@click.option("--resume", is_flag=True, help="Continue a batch: do again only what has changed since.")
 @click.option("--retry", is_flag=True, help="With --resume, try again what failed, though nothing has changed.")
 @click.option(
     "--strategy",
@@ -132,7 +132,7 @@ def _executors() -> Iterable[str]:
     type=click.Choice(BLOCK_NUMBERS),
     default="same",
     show_default=True,
-    help="Of blocks that are put in (Klartext), or all blocks anew (SINUMERIK, too).",
+    help="Numbers of inserted blocks (Klartext); renumber: of all blocks, anew (SINUMERIK, too).",
 )
 @click.option("--allow-refused", is_flag=True, help="Write the program even if motions had to be left uncorrected.")
 @click.option(
@@ -143,7 +143,9 @@ def _executors() -> Iterable[str]:
     help="Make a page of the program, or of the batch and each program.",
 )
 @click.option("--plot", type=PATH, metavar="FILE.svg|png|pdf", help="Draw the errors of one program for a paper.")
-@click.option("--certificate", is_flag=True, help="Let a second reader prove it; its certificate stands beside it.")
+@click.option(
+    "--certificate", is_flag=True, help="Let an independent reader prove the result; its certificate stands beside it."
+)
 @click.option("--diff", is_flag=True, help="Print how the text would change (unified diff); write nothing.")
 @click.option("--diff-motions", is_flag=True, help="Print which commands would change, and why; write nothing.")
 @click.option("--no-figures", "verify", is_flag=True, flag_value=False, default=True, help="Leave out the tip errors.")
@@ -152,7 +154,7 @@ def _executors() -> Iterable[str]:
     "--jobs",
     type=Jobs(),
     default="auto",
-    show_default="auto, as many as pay",
+    show_default="auto, as many as help",
     metavar="N|auto",
     help="Processes that work on a long program, or programs at a time; the result is the same.",
 )
@@ -166,10 +168,8 @@ def _executors() -> Iterable[str]:
 )
 @click.option("--time-limit-s", type=Positive(), metavar="S", help="Seconds that one program may take.")
 @click.option("--memory-limit-mb", type=click.IntRange(1), metavar="MB", help="Memory that one program may take.")
-@click.option("-q", "--quiet", is_flag=True, help="Say only of which programs nothing was written, and why.")
-@click.option(
-    "-v", "--verbose", is_flag=True, help="Of many programs, say all of each; and as which dialect it was read."
-)
+@click.option("-q", "--quiet", is_flag=True, help="Say only which programs were not written, and why.")
+@click.option("-v", "--verbose", is_flag=True, help="Say everything about each program of a batch, and its dialect.")
 @project_options
 @json_option
 @click.option("--json-lines", is_flag=True, help="Print one JSON object for each program as soon as it is done.")

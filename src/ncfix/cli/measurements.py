@@ -60,7 +60,7 @@ FIGURES["mean_reversal"] = "mean B"
     type=click.Choice(LOSSES),
     default="auto",
     show_default=True,
-    help="What far-off values count: auto gives gross outliers no weight and names them.",
+    help="How much outliers count: auto gives gross ones no weight and names them.",
 )
 @click.option(
     "--prune",
@@ -94,8 +94,8 @@ def calibrate(
 ) -> int:
     """Estimate the errors of a machine from measurements and write the machine with them.
 
-    Without --effects those of the machine file are estimated; of a machine without effects, all that can be, of an arm
-    where its joints lie. Exit code 4: the result does not describe the measurements, and nothing was written.
+    Without --effects: the effects of the machine file; if it has none, all that can be estimated (of an arm, where its
+    joints lie). Exit code 4: the result does not describe the measurements, and nothing was written.
     """
     from ncfix.machine import dumps
     from ncfix.measure.reader import reads
@@ -256,7 +256,7 @@ def _say_bar(bar: dict[str, Any]) -> None:
     "--input", "inputs", multiple=True, metavar="NAME=LOW,HIGH", help="What else can be set, e.g. load_kg (repeatable)."
 )
 @click.option("--gcode", type=PATH, metavar="FILE", help="Also write a skeleton of the program that goes to the poses.")
-@click.option("--seed", type=numbers(SEED), default=0, help="Other candidates.")
+@click.option("--seed", type=numbers(SEED), default=0, help="Another seed gives other candidate poses.")
 @table_option
 @force_option
 @json_option

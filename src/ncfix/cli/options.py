@@ -95,7 +95,7 @@ dialect_option = click.option(
     type=DIALECT,
     metavar="NAME",
     envvar="NCFIX_DIALECT",
-    help="The control's language; found out if not given.",
+    help="The control's dialect; recognised if not given.",
 )
 table_option = click.option(
     "-o", "--output", type=PATH, metavar="FILE", default=STREAM, help="Where to write the table (CSV)."

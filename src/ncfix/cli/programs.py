@@ -54,7 +54,7 @@ def _whole(following: FollowingSetup, source: Source, flatten: bool) -> Found:
 @optional_machine_option
 @dialect_option
 @setup_options
-@click.option("--flatten", is_flag=True, help="With a machine file: find what is refused though it is written flat.")
+@click.option("--flatten", is_flag=True, help="With a machine file: find what `fix --flatten` would still refuse.")
 @project_options
 @json_option
 def check(

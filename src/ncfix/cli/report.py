@@ -46,7 +46,7 @@ def report(
     given: SetupOptions,
     **options: Any,
 ) -> None:
-    """Put machine files, and what other verbs printed with --json, on one page; or with -m, a program.
+    """Make one page of machine files and of results (what other commands print with --json); with -m, of a program.
 
     Of a machine: its chain, its errors with their curves and uncertainty, and how far they lead the tool tip. Of a
     result: its tables; of a batch, a list to sort and filter. Of a program: its path with the errors before and after

@@ -151,7 +151,7 @@ OPTIONS = (
         "--tool-unit",
         type=click.Choice(("mm", "inch")),
         metavar="[mm|inch]",
-        help="The unit of a tool table that does not say it; mm without this option.",
+        help="The unit of a tool table that names none (default: mm).",
     ),
     click.option(
         "--initial",
@@ -178,19 +178,19 @@ OPTIONS = (
         type=click.Path(exists=True, file_okay=False),
         multiple=True,
         metavar="DIR",
-        help="Where subprograms are that are not beside the program (repeatable).",
+        help="Where else than beside the program subprograms are looked for (repeatable).",
     ),
     click.option(
         "--probed",
         type=AxisValues(),
         multiple=True,
-        help="Where probing ends nominally, coordinates of the program: its results count as known (repeatable).",
+        help="Where probing nominally ends, in coordinates of the program; its results count as known (repeatable).",
     ),
     click.option(
         "--block-skip",
         type=Switches(),
         metavar="[both|on|off|2,3]",
-        help="Blocks with / are skipped (on), executed (off), or may be either (both, as it is without this option); "
+        help="Blocks with / are skipped (on), executed (off), or may be either (both, the default); "
         "or the numbers of the switches that are on.",
     ),
     click.option("--assume-zero", is_flag=True, help="What is used and not given is zero; each is named in a warning."),

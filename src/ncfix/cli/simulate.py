@@ -41,7 +41,7 @@ OF_PLANS = ("noise_um", "drift_um", "quantum_um", "setup_error", "seed")
 @click.option("--drift-um", type=NOT_NEGATIVE, default=0.0, help="Largest drift over the measurement (with --plan).")
 @click.option("--quantum-um", type=NOT_NEGATIVE, default=0.0, help="Step of the instrument (with --plan).")
 @click.option("--setup-error", type=NOT_NEGATIVE, default=1.0, help="How far the set-up is off (with --plan).")
-@click.option("--seed", type=numbers(SEED), default=0, help="Other numbers, other noise (with --plan).")
+@click.option("--seed", type=numbers(SEED), default=0, help="Another seed gives other noise (with --plan).")
 @click.option(
     "-o", "--output", type=PATH, metavar="FILE", help="Write the error along the path, or the measurement (CSV)."
 )

@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     type=Positive(TARGET_UM.low),
     default=1.0,
     show_default=True,
-    help="How much correction may be lost between the points of a table.",
+    help="How far the tables may be off between their points, um.",
 )
 @click.option(
     "--range",
@@ -206,7 +206,7 @@ def emulate(
     given: SetupOptions,
     as_json: bool,
 ) -> int:
-    """Say what the tables in TABLEDIR, which `ncfix export` wrote for CONTROL, leave on this machine.
+    """Run the tables in TABLEDIR, which `ncfix export` wrote for CONTROL, and say what error they leave on this machine.
 
     Exit code 1 if there is something to remark on the files.
     """
@@ -243,10 +243,10 @@ def _below(folder: str, messages: Iterable[Message], names: Container[str]) -> t
 
 @click.command()
 @click.argument("paths", nargs=-1, required=True, metavar="FILE...")
-@click.option("--control", metavar="NAME", default="", help="Whose tables they are; else by what they hold.")
+@click.option("--control", metavar="NAME", default="", help="The control that they are for; recognised if not given.")
 @json_option
 def lint(paths: tuple[str, ...], control: str, as_json: bool) -> int:
-    """Say what a control would not load, or would misread, in each FILE; of a folder in all of its files.
+    """Find what a control would not load, or would misread, in each FILE, or in all files of a folder.
 
     Files of one control that lie in one folder are looked at together. Exit code 1 with findings, 3 if a file is of no
     known form.

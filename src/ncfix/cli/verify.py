@@ -110,9 +110,11 @@ def compared(following: FollowingSetup, original: str, fixed: str, tolerance_um:
     "--certificate",
     type=PATH,
     metavar="FILE",
-    help="Let the second reader prove it instead; write what it finds (JSON).",
+    help="Instead, let an independent reader prove FIXED; write what it finds (JSON).",
 )
-@click.option("--against", type=PATH, metavar="FILE", help="Is this certificate of these files, and does it hold?")
+@click.option(
+    "--against", type=PATH, metavar="FILE", help="Check that this certificate belongs to these files and still holds."
+)
 @project_options
 @json_option
 def verify(
@@ -129,7 +131,7 @@ def verify(
     """Compare what this machine cuts with FIXED with what ORIGINAL means, along the whole path.
 
     Exit code 1 if the tool tip leaves the intended path by more than the tolerance and what the control's digits
-    add, or may, where nobody can look.
+    add, or if a part of the path that may cut could not be looked at.
     """
     following = FollowingSetup.of(machine_path, dialect, given)
     if certificate is not None or against is not None:

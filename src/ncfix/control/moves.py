@@ -379,11 +379,11 @@ PASS_RULES: Mapping[Pass, PassRule] = {
         "probing", STRAIGHT, False, "It ends where the probe switches, and what it measures must stay comparable."
     ),
     Pass.UNSAID: PassRule(
-        "rapid while an axis has not been said",
+        "rapid before the program has placed an axis",
         RAPIDS,
         False,
-        "Its correction would need a word for an axis of which nobody has said where it stands. It cuts nothing, and "
-        "the first block that names the axis is corrected.",
+        "Its correction would need a word for an axis that the program has not brought to a place of its own yet. It "
+        "cuts nothing, and the first block that names the axis is corrected.",
     ),
     Pass.SKIPPED: PassRule(
         "rapid behind a block with /",

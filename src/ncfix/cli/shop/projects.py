@@ -245,7 +245,7 @@ def project_options(command: Callable[..., Any]) -> Callable[..., Any]:
 def init(folder: str, machine: str | None, setup: str | None, output: str | None, force: bool) -> None:
     """Write a project file ncfix.toml into FOLDER, so that `ncfix fix PROGRAM` needs no options there.
 
-    What is not said is asked for. Paths are counted from FOLDER.
+    It asks for what no option gives. Paths are counted from FOLDER.
     """
     from ncfix import files
     from ncfix.machine import load

@@ -147,17 +147,20 @@ def _clock(at: float) -> str:
     type=Positive(),
     default=2.0,
     show_default=True,
-    help="A program that has not changed for so long is complete.",
+    help="A program is complete when it has not changed for so many seconds.",
 )
 @click.option(
-    "--poll-s", type=Positive(), metavar="S", help="Look at IN every S seconds: for shares, where nothing is told."
+    "--poll-s",
+    type=Positive(),
+    metavar="S",
+    help="Look at IN every S seconds: for network shares, which report no changes.",
 )
-@click.option("--status", type=PATH, metavar="FILE.html", help="A page that says what became of the programs.")
+@click.option("--status", type=PATH, metavar="FILE.html", help="Keep a page of what became of the programs.")
 @click.option("--once", is_flag=True, help="End when all that is in IN now is done.")
 @click.option("--project", type=PATH, metavar="FILE", expose_value=False, help="The project file.")
 @click.option("--no-project", is_flag=True, expose_value=False, help="Use no project file.")
-@click.option("-q", "--quiet", is_flag=True, help="Say only of which programs nothing was written, and why.")
-@click.option("-v", "--verbose", is_flag=True, help="Say all of each program.")
+@click.option("-q", "--quiet", is_flag=True, help="Say only which programs were not written, and why.")
+@click.option("-v", "--verbose", is_flag=True, help="Say everything about each program.")
 def watch(
     folder: str,
     output: str,
