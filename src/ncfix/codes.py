@@ -41,14 +41,14 @@ CODES = {
         "Leave it out once; a measurement that was repeated is another file, or has a column `repeat`.",
     ),
     "NCF023": Code(
-        "a name that no output gets",
+        "a name that an output may not have",
         "Programs are carried to controls, and those run Windows. There `CON.nc` is the console, a full stop or blank "
         "at the end of a name is dropped, and `\\` or `:` in it make a path of it. A name with a control character, or "
         "one that leads out of the output folder, is not written either. This holds on all systems.",
         "Give the program, or the output, another name.",
     ),
     "NCF025": Code(
-        "an argument that is none",
+        "an invalid argument",
         "A function was given a number outside the range that makes sense, a choice that there is not, or nothing "
         "where something is needed. The command line refuses the same values of its options with NCF001.",
         "The hint of the message says what there is; docs/api.md shows the functions at work.",

@@ -43,7 +43,7 @@ CODES = {
     ),
     "NCF012": Code("interrupted", "The command was stopped with Ctrl-C. Outputs that were not complete are not there."),
     "NCF013": Code(
-        "written to a pipe, and would have to be different",
+        "an output in a pipe that would have to change",
         "A long program that goes to a pipe is written while it is read. Further down something was found that changes "
         "what comes before it: a refusal that reaches far back, or frames that are set where the machine stands.",
         "Give the program as a file; then it is looked at as a whole before anything is written.",

@@ -206,7 +206,7 @@ def emulate(
     given: SetupOptions,
     as_json: bool,
 ) -> int:
-    """Run the tables in TABLEDIR, which `ncfix export` wrote for CONTROL, and say what error they leave on this machine.
+    """Run the tables in TABLEDIR, which `ncfix export` wrote for CONTROL, and say what error they leave.
 
     Exit code 1 if there is something to remark on the files.
     """

@@ -67,7 +67,7 @@ CODES = {
         "Omit it if it is not known.",
     ),
     "NCF313": Code(
-        "a direction that is none",
+        "an invalid direction",
         "A direction is not zero; `error_axes` are three perpendicular unit vectors, right-handed, as rows.",
         FORMATS,
     ),
