@@ -118,6 +118,7 @@ def test_workers_are_killed_and_then_the_scheduler(ncfix: Any, parts: Path, clus
             cluster.workers[kill % 2] = cluster.worker()
     _, said = running.communicate(timeout=PATIENCE_S)
     assert running.returncode == ExitCode.DONE, said
+    assert "distributed" not in said
     assert contents(parts / "out") == contents(parts / "whole")
     assert len(Journal("out").records) == COUNT
 
@@ -127,6 +128,7 @@ def test_workers_are_killed_and_then_the_scheduler(ncfix: Any, parts: Path, clus
     _, said = running.communicate(timeout=2 * PATIENCE_S)
     assert running.returncode == ExitCode.USAGE, said
     assert "NCF029" in said
+    assert "distributed" not in said
     result = ncfix(*COMMAND, "second", "--json")
     assert result.code == ExitCode.DONE
     assert contents(parts / "second") == contents(parts / "whole")

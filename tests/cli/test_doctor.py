@@ -76,7 +76,7 @@ def test_a_folder_that_cannot_be_written_to(ncfix: Any, monkeypatch: pytest.Monk
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(doctor.tempfile, "TemporaryDirectory", locked)
-    assert "cannot be written to: Permission denied" in ncfix("doctor").out.decode()
+    assert "not writable: Permission denied" in ncfix("doctor").out.decode()
 
 
 def test_the_package_brings_the_manual_page_and_the_scripts_of_now(root: Path) -> None:

@@ -8,6 +8,7 @@ with it.
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future
@@ -53,6 +54,7 @@ class ClusterExecutor(Executor):
     def _connected(self, place: str) -> Any:
         from distributed import Client
 
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what it has to say, ncfix says itself
         connect: Callable[..., Any] = Client
         try:
             return connect(f"tcp://{place}", timeout=CONNECT_S, set_as_default=False)

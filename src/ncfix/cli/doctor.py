@@ -54,7 +54,7 @@ def findings() -> Iterator[HostFinding]:
     python = f"{platform.python_version()}, {sys.executable}"
     yield HostFinding("Python", python, "" if sys.version_info >= OLDEST_PYTHON else "3.11 or later is needed")
     yield HostFinding(
-        "computer", f"{platform.platform()}, {console.counted(host.processors(), 'processor')} to be used"
+        "computer", f"{platform.platform()}, {console.counted(host.processors(), 'processor')} available"
     )
     yield from _packages()
     stale = core.fault() and core.has_binary()  # it is not of these sources
@@ -64,7 +64,7 @@ def findings() -> Iterator[HostFinding]:
     yield _temporary()
     yield _outputs()
     settings = sorted(name for name in os.environ if name.startswith("NCFIX_"))
-    yield HostFinding("environment", ", ".join(f"{name}={os.environ[name]}" for name in settings) or "nothing of ncfix")
+    yield HostFinding("environment", ", ".join(f"{name}={os.environ[name]}" for name in settings) or "no NCFIX_... is set")
 
 
 def _packages() -> Iterator[HostFinding]:
@@ -121,10 +121,10 @@ def _caches() -> Iterator[HostFinding]:
         can = _writable(folder)
         writable = writable or can
         size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) if folder.is_dir() else 0
-        state = "can be written to" if can else "cannot be written to"
+        state = "writable" if can else "not writable"
         yield HostFinding("cache", f"{folder}, {size / 1e6:.1f} MB, {state}")
     if not writable:
-        yield HostFinding("caches", "none can be written to", "make one of them; until then each start takes longer")
+        yield HostFinding("caches", "none is writable", "make one of them; until then each start takes longer")
 
 
 def _writable(folder: Path) -> bool:
@@ -162,13 +162,13 @@ def _outputs() -> HostFinding:
             append(path, b"and more\n")
             unnamed = hasattr(os, "O_TMPFILE") and _has_unnamed(folder)
     except OSError as error:
-        return HostFinding("working folder", f"cannot be written to: {error.strerror}")
+        return HostFinding("working folder", f"not writable: {error.strerror}")
     except NcfixError as error:
         return HostFinding(
             "working folder", f"{visible(os.getcwd())}: {error.messages[0].text}", error.messages[0].advice
         )
-    how = "without a name at first" if unnamed else "under another name at first"
-    return HostFinding("working folder", f"{visible(os.getcwd())}: outputs are written {how}")
+    how = "" if unnamed else ", first as .ncfix-*.tmp"
+    return HostFinding("working folder", f"{visible(os.getcwd())}: writable; outputs appear whole or not at all{how}")
 
 
 def _has_unnamed(folder: str) -> bool:
