@@ -93,8 +93,9 @@ class Writer:
         if self.klartext:
             sign = self.rng.choice("+-")
             text = f"Q1 {more[0]} {more[1:]}" if self.rng.random() < 0.5 else f"( Q1 / 2 ) {half[0]} {half[1:]}"
-            self.put(f"Q2 = {text}" if sign == "+" else f"FN 2: Q2 = {-value + 12.5:+.3f} - +Q1")
-            return f"{axis}{sign}Q2"
+            name = f"Q{2 + 'XYZAC'.index(axis)}"
+            self.put(f"{name} = {text}" if sign == "+" else f"FN 2: {name} = {-value + 12.5:+.3f} - +Q1")
+            return f"{axis}{sign}{name}"
         if self.language == "siemens":
             return self.rng.choice((f"{axis}=R1{more}", f"{axis}=(R1/2){half}"))
         return self.rng.choice((f"{axis}[#101{more}]", f"{axis}[[#101/2]{half}]", f"{axis}[{value}]"))
