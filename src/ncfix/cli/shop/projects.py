@@ -278,7 +278,7 @@ def _asked(option: str, given: str | None, what: str, default: str | None) -> st
     if sys.stdin is None or not sys.stdin.isatty():
         if default is not None:
             return default
-        raise UsageError.of("NCF001", f"the {what} is not given, and there is no terminal to ask at", hint=f"--{option}")
+        raise UsageError.of("NCF001", f"the {what} is not given, and there is no terminal to ask", hint=f"--{option}")
     return str(click.prompt(what, default=default, err=True))
 
 
