@@ -53,9 +53,7 @@ def findings() -> Iterator[HostFinding]:
     yield HostFinding("ncfix", f"{__version__}, {Path(__file__).parents[1]}")
     python = f"{platform.python_version()}, {sys.executable}"
     yield HostFinding("Python", python, "" if sys.version_info >= OLDEST_PYTHON else "3.11 or later is needed")
-    yield HostFinding(
-        "computer", f"{platform.platform()}, {console.counted(host.processors(), 'processor')} available"
-    )
+    yield HostFinding("computer", f"{platform.platform()}, {console.counted(host.processors(), 'processor')} available")
     yield from _packages()
     stale = core.fault() and core.has_binary()  # it is not of these sources
     yield HostFinding("core", core.status(), core.fault() if stale else "")
@@ -64,7 +62,7 @@ def findings() -> Iterator[HostFinding]:
     yield _temporary()
     yield _outputs()
     settings = sorted(name for name in os.environ if name.startswith("NCFIX_"))
-    yield HostFinding("environment", ", ".join(f"{name}={os.environ[name]}" for name in settings) or "no NCFIX_... is set")
+    yield HostFinding("environment", ", ".join(f"{name}={os.environ[name]}" for name in settings) or "no NCFIX_...")
 
 
 def _packages() -> Iterator[HostFinding]:
