@@ -6,8 +6,22 @@ import random
 from typing import ClassVar
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from metamorphic.composing import SECOND, SHORT, Author, Frame, Vector, number, scaled, shifted, turned
+from metamorphic.composing import (
+    FEED,
+    PLANES,
+    SECOND,
+    SHORT,
+    SPEED,
+    Author,
+    Frame,
+    Vector,
+    number,
+    scaled,
+    shifted,
+    turned,
+)
 from metamorphic.harness import LENGTH
 
 MACRO = ("fanuc", "haas", "mitsubishi")
@@ -21,11 +35,12 @@ class IsoAuthor(Author):
 
     def begin(self) -> None:
         self.tool, self.fed, self.prefix, self.plane = 1, "", "", False
+        self.rates, self.way, self.pointing, self.repeated = "G94", 0.0, False, False
         self.loops: list[int] = []
         self.second, self.kept = False, SECOND
         self.shift, self.local, self.rotation, self.mirror = Frame(), Frame(), Frame(), Frame()
         self.lines += ["%", "O1"] if self.dialect in MACRO else []
-        self.lines += ["G21 G17 G40 G49 G80 G90 G94", "G54"]
+        self.lines += ["G21 G17 G40 G49 G80 G90 G94 S1000", "G54"]
 
     def finish(self) -> str:
         if self.dialect == "linuxcnc":
@@ -42,10 +57,14 @@ class IsoAuthor(Author):
 
     def alone(self, line: str, moves: bool = False) -> None:
         """A line that is no plain motion."""
+        self.flush()
+        self.put(line, moves)
+
+    def flush(self) -> None:
+        """The codes that wait for a motion."""
         if self.prefix:
             self.put(self.prefix.strip())
         self.prefix = ""
-        self.put(line, moves)
 
     def word(self, letter: str, value: float) -> str:
         """A word, sometimes computed."""
@@ -60,8 +79,8 @@ class IsoAuthor(Author):
 
     def motion(self, code: str, words: list[str]) -> None:
         """A motion block."""
-        feed = f"F{number(500.0 / self.unit, 5)}"
-        if code == "0" or (feed == self.fed and self.often(0.7)):
+        feed = self.feed()
+        if code == "0" or (feed == self.fed and self.rates != "G93" and self.often(0.7)):
             feed = ""
         else:
             self.fed = feed
@@ -74,8 +93,34 @@ class IsoAuthor(Author):
         self.put(self.prefix + (" " if not self.often(0.1) else "").join(parts), moves=True)
         self.prefix = ""
 
+    rate = 1.0
+
+    def feed(self) -> str:
+        """F of 500 mm/min, as a rate of the way that is before the tool, or per revolution."""
+        if self.rates == "G93":
+            return f"F{number(FEED / (self.way or FEED), 8)}"
+        return f"F{number(FEED / self.rate / (SPEED if self.rates == 'G95' else 1.0), 7)}"
+
+    def minutes(self) -> None:
+        """G94, if that is not in force."""
+        if self.rates != "G94":
+            self.feeds(self.style)
+
+    def directed(self, target: Vector, values: dict[str, float]) -> list[str]:
+        """The words of rotary axes, or of the direction to which they turn the tool, taken out of a motion's."""
+        names = self.letters[3:]
+        pointed = self.pointed(target) if self.pointing and set(names) & set(values) else None
+        for name in names if pointed is not None else ():
+            values.pop(name, None)
+        return [] if pointed is None else [f"{a}{number(v, 9)}" for a, v in zip("IJK", pointed, strict=True)]
+
     def go(self, code: str, target: Vector, extra: list[str] | None = None) -> None:
         """A motion to a place; increments begin where the program has said where the axes stand."""
+        turns = (target[3:] != self.q[3:]).any() or self.unsaid & set(self.letters[3:])
+        if self.pointing and turns and self.pointed(target) is None:
+            self.tip(self.style)
+        if not extra:
+            self.way = float(np.linalg.norm((target - self.q)[:3]))
         steps = self.steps and bool(self.unsaid)
         if steps:
             self.absolute()
@@ -87,7 +132,8 @@ class IsoAuthor(Author):
         polar = polar and self.flat and self.dialect in (*MACRO, "linuxcnc") and code in ("0", "1") and self.often(0.15)
         if polar:
             values |= {"X": float(np.hypot(*across)), "Y": float(np.degrees(np.arctan2(across[1], across[0])))}
-        words = [self.word(letter, value) for letter, value in values.items()]
+        vector = self.directed(target, values)
+        words = [*(self.word(letter, value) for letter, value in values.items()), *vector]
         if polar and self.dialect == "linuxcnc":
             words = [{"X": "@", "Y": "^"}.get(word[0], word[0]) + word[1:] for word in words]
             polar = False
@@ -109,24 +155,75 @@ class IsoAuthor(Author):
         self.go("0", self.somewhere(chance, turns=self.rotary))
 
     def arc(self, chance: random.Random) -> None:
-        """A rapid to where it begins, and an arc or a helix."""
-        self.go("0", self.somewhere(chance))
-        target, centre, sweep, _ = self.bow(chance)
-        right = (sweep > 0) == (np.linalg.det(self.frame.turn[:2, :2]) > 0)
-        i, j = np.linalg.solve(self.frame.turn, centre - self.q[:3])[:2] / self.unit
-        code, middle = self.circle(right, np.array([i, j]), target, sweep)
-        self.go(code, target, middle)
+        """A rapid to where it begins, and an arc or a helix in one of the planes."""
+        begin, across = self.somewhere(chance), chance.choice("ZZZYX")
+        begin[2] = min(begin[2], 260.0)
+        self.go("0", begin)
+        if across != "Z":
+            self.square_up()
+            self.mode({"Y": "G18", "X": "G19"}[across])
+        self.round(*self.bow(chance, across)[:3], across)
+        if across != "Z":
+            self.mode("G17")
 
-    def circle(self, right: bool, middle: Vector, target: Vector, sweep: float) -> tuple[str, list[str]]:
-        """Code and words of an arc; `middle`: from where it starts to its centre."""
-        words = [f"I{number(middle[0], 6)}", f"J{number(middle[1], 6)}"]
+    def square_up(self) -> None:
+        """No turned frame."""
+        if (self.rotation.turn - np.eye(3)).any():
+            self.absolute()
+            self.rotate(self.style)
+
+    def round(self, target: Vector, centre: Vector, sweep: float, across: str = "Z", tangent: bool = False) -> None:
+        """An arc; `tangent`: it goes on in the direction of the motion before it."""
+        plane = PLANES[across]
+        right = (sweep > 0) == (np.linalg.det(self.frame.turn[np.ix_(plane, plane)]) > 0)
+        middle = np.linalg.solve(self.frame.turn, centre - self.q[:3]) / self.unit
+        self.way = float(np.linalg.norm((centre - self.q[:3])[plane]) * abs(sweep))
+        code, words = self.circle(right, middle, target, sweep, plane, tangent)
+        absolute = self.dialect == "linuxcnc" and self.often(0.2)
+        if absolute:
+            self.alone("G90.1")
+            centre = middle + self.place(self.q)[:3] / self.unit
+            words = [f"{'IJK'[n]}{number(centre[n], 6)}" for n in plane]
+        self.go(code, target, words)
+        if absolute:
+            self.alone("G91.1")
+
+    def circle(
+        self, right: bool, middle: Vector, target: Vector, sweep: float, plane: list[int], tangent: bool
+    ) -> tuple[str, list[str]]:
+        """Code and words of an arc; `middle` (3,): from where it starts to its centre."""
+        words = [f"{'IJK'[n]}{number(middle[n], 6)}" for n in plane]
         if self.often(0.3):
-            words = [f"R{number(np.hypot(*middle) * (1 if abs(sweep) < np.pi else -1), 7)}"]
+            words = [f"R{number(np.linalg.norm(middle[plane]) * (1 if abs(sweep) < np.pi else -1), 7)}"]
         return "3" if right else "2", words
+
+    def corner(self, chance: random.Random) -> None:
+        """Two lines with a rounding or a chamfer between them."""
+        self.go("0", self.somewhere(chance))
+        first, last, _, _ = self.legs(chance)
+        size, wild = number(2.0 / self.unit / abs(self.frame.turn[2, 2]), 6), self.wild
+        self.wild = False
+        self.go("1", first, self.rounded(chance, size))
+        self.go("1", last)
+        self.wild = wild
+
+    def rounded(self, chance: random.Random, size: str) -> list[str]:
+        """The word of a corner."""
+        return [f",{chance.choice('RC')}{size}"] if self.dialect in MACRO else []
+
+    def tangent(self, chance: random.Random) -> None:
+        """A line, and an arc that goes on in its direction."""
+        self.go("0", self.somewhere(chance))
+        first, _, centre, sweep = self.legs(chance)
+        self.go("1", first)
+        target = first.copy()
+        target[:3] = centre + turned("Z", np.degrees(sweep)).turn @ (first[:3] - centre)
+        self.round(target.round(6), centre, sweep, tangent=True)
 
     def hole(self, chance: random.Random) -> None:
         """Some holes of one cycle."""
         self.go("0", self.somewhere(chance))
+        self.minutes()
         if self.steps:
             self.steps = False
             self.alone("G90")
@@ -162,33 +259,86 @@ class IsoAuthor(Author):
                 self.alone(f"{side} D{self.tool}" if self.dialect != "siemens" else side)
             self.go("1", target)
         self.alone("G40")
-        self.go("1", self.q + np.array([0.0, 0.0, 10.0, 0.0, 0.0]))
+        self.go("1", self.q + np.array([0.0, 0.0, 5.0, 0.0, 0.0]))
         self.unsaid = set(self.letters)
 
     def twice(self, chance: random.Random) -> None:
-        """A stretch that is gone through twice, sometimes as a subprogram with repeats."""
-        steps, places = self.steps, [self.somewhere(chance, turns=self.rotary) for _ in range(2)]
+        """A stretch, or steps, gone through twice, sometimes as a subprogram with repeats."""
+        steps, relative = self.steps, chance.random() < 0.3
+        places = [self.somewhere(chance, turns=self.rotary) for _ in range(2)]
+        self.minutes()
         self.absolute()
-        if not self.often(0.7) or self.dialect == "iso":
-            for each in places * 2:
-                self.unsaid = set(self.letters)
-                self.go("1", each)
-        else:
-            name, (outer, loops) = next(self.names), (self.lines, self.loops)
-            self.alone(self.called_twice(name))
+        rounds = [places, places]
+        if relative:
+            self.upright()
+            self.go("0", self.q)
+            by = [(0.1 * (place - self.q)).round(3) for place in places]
+            rounds = [[self.q + n * sum(by) + by[0], self.q + (n + 1) * sum(by)] for n in range(2)]
+        calls = self.often(0.7) and self.dialect != "iso"
+        if calls:
+            if relative:
+                self.increments(self.style)
+            self.flush()
+            self.repeated = relative
+            outer, loops = self.lines, self.loops
             self.lines, self.loops, self.code, self.fed = [], [], "", ""
-            for each in places:
+        for each in rounds[0] if calls else [*rounds[0], *rounds[1]]:
+            if not relative:
                 self.unsaid = set(self.letters)
-                self.go("1", each)
+            self.go("1", each)
+        if calls:
             body, self.lines, self.loops = self.lines, outer, loops
-            self.behind += self.subprogram(name, body)
-        if steps:
+            self.put_twice(next(self.names), body)
+            self.repeated = False
+        self.q = rounds[1][-1]
+        if steps != self.steps:
             self.increments(self.style)
 
-    def called_twice(self, name: int) -> str:
+    def upright(self) -> None:
+        """No control of the tip, nor a tilted plane."""
+        if self.tcp:
+            self.absolute()
+            (self.tilted if self.plane else self.tip)(self.style)
+
+    def put_twice(self, name: int, body: list[str]) -> None:
+        """A stretch that is gone through twice."""
         if self.dialect == "linuxcnc":
-            return f"o{7000 + name} call\no{7000 + name} call"
-        return f"M98 P{7000 + name} L2"
+            call = f"o{7000 + name} call\no{7000 + name} call"
+        else:
+            call = self.style.choice([f"M98 P{7000 + name} L2", f"M98 P2{7000 + name}"])
+        self.put(call)
+        self.behind += self.subprogram(name, body)
+
+    def macro(self, chance: random.Random) -> None:
+        """Two lines, sometimes by macros that get their ends."""
+        places = [self.somewhere(chance) for _ in range(2)]
+        self.go("0", self.q)
+        if not self.wild or self.steps or self.dialect == "iso":
+            for each in places:
+                self.go("1", each)
+            return
+        self.minutes()
+        name = 0
+        for self.q in places:
+            ends = self.place(self.q)[:3] / self.unit * ((2.0 if self.diameter else 1.0), 1.0, 1.0)
+            if not (self.flat and name):
+                name = next(self.names)
+                self.defined(name)
+            self.alone(self.given(name, [number(each, 6) for each in (*ends, FEED / self.rate)]))
+        self.code, self.fed = "", ""
+
+    def defined(self, name: int) -> None:
+        """A macro that makes a line."""
+        x, y, z, rate = (1, 2, 3, 4) if self.dialect == "linuxcnc" else (24, 25, 26, 9)
+        line = f"G1 X#{x} Y#{y} Z#{z} F#{rate}"
+        self.behind += self.subprogram(name, [line])
+        self.moving.add(line)
+
+    def given(self, name: int, values: list[str]) -> str:
+        """Its call."""
+        if self.dialect == "linuxcnc":
+            return f"o{7000 + name} call " + " ".join(f"[{value}]" for value in values)
+        return f"G65 P{7000 + name} " + " ".join(map("{}{}".format, "XYZF", values))
 
     def subprogram(self, name: int, body: list[str]) -> list[str]:
         if self.dialect == "linuxcnc":
@@ -203,7 +353,9 @@ class IsoAuthor(Author):
         self.unsaid |= set(self.letters)
 
     def reference(self, chance: random.Random) -> None:
-        """A retraction to the reference point."""
+        """A retraction to the reference point, which ends a tool length of Haas."""
+        if self.dialect == "haas":
+            self.upright()
         if self.often(0.5) or self.steps:
             self.alone("G91 G28 Z0." if not self.steps or self.often(0.5) else "G28 Z0.", moves=True)
             self.mode("G90")
@@ -219,8 +371,7 @@ class IsoAuthor(Author):
     def other_tool(self, chance: random.Random) -> None:
         """The other tool, with no length in force."""
         self.absolute()
-        if self.tcp:
-            self.tilted(chance) if self.plane else self.tip(chance)
+        self.upright()
         self.tool = 3 - self.tool
         self.length = 0.0
         self.alone("G49")
@@ -246,22 +397,35 @@ class IsoAuthor(Author):
             self.mode("G91")
             self.steps = True
 
+    def feeds(self, chance: random.Random) -> None:
+        """F by the time that a motion takes, or per revolution, or per minute again."""
+        if not self.rotary:
+            self.rates = "G94" if self.rates != "G94" else chance.choice(["G93", "G95"])
+            self.mode(self.rates)
+            self.fed = ""
+
+    diameter = False
+
     def units(self, chance: random.Random) -> None:
-        self.unit = 25.4 if self.unit == 1.0 else 1.0
-        self.mode("G21" if self.unit == 1.0 else "G20")
+        self.unit = self.rate = 25.4 if self.unit == 1.0 else 1.0
+        (self.alone if self.dialect in ("iso", "linuxcnc") else self.mode)("G21" if self.unit == 1.0 else "G20")
         self.fed = ""
 
     def table(self, chance: random.Random) -> None:
         """G10: the work offset in force becomes another one."""
         if self.plain_frame() and not self.steps and not self.tcp and self.dialect != "haas":
             self.offset = dict(self.offset) | {a: round(self.offset[a] + chance.uniform(-5, 5), 2) for a in "XYZ"}
-            words = " ".join(f"{a}{number(self.offset[a] / self.unit, 6)}" for a in "XYZ")
-            self.alone(f"G10 L2 P{2 if self.second else 1} {words}")
+            by_place = self.dialect == "linuxcnc" and not self.unsaid and chance.random() < 0.5
+            shown = self.place(self.q) if by_place else [self.offset[a] for a in "XYZ"]
+            words = " ".join(f"{a}{number(v / self.unit, 6)}" for a, v in zip("XYZ", shown, strict=False))
+            self.alone(f"G10 L{20 if by_place else 2} P{2 if self.second else 1} {words}")
             self.unsaid = set(self.letters)
 
     def compose(self) -> None:
         """The frame that its parts make."""
         self.frame = self.shift @ self.local @ self.rotation @ self.mirror
+        if self.dialect == "linuxcnc":
+            self.frame = self.rotation @ self.shift @ self.local
 
     def plain_frame(self) -> bool:
         """Neither turned nor mirrored."""
@@ -297,9 +461,17 @@ class IsoAuthor(Author):
 
     def rotate(self, chance: random.Random) -> None:
         """G68, off or on."""
-        if self.dialect not in MACRO or self.steps or self.tcp:
+        if self.dialect == "iso" or self.steps or self.tcp:
             return
-        if (self.rotation.turn - np.eye(3)).any():
+        off = (self.rotation.turn - np.eye(3)).any()
+        if self.dialect == "linuxcnc":
+            if (self.shift @ self.local).shift.any():
+                return
+            askew = 90.0 if self.exact else round(chance.uniform(-180, 180), 2)
+            angle = 0.0 if off else chance.choice([90.0, 180.0, askew])
+            self.rotation = turned("Z", angle)
+            self.alone(f"G10 L2 P{2 if self.second else 1} R{angle}")
+        elif off:
             self.rotation = Frame()
             self.mode("G69")
         else:
@@ -340,20 +512,41 @@ class IsoAuthor(Author):
 
     def tip(self, chance: random.Random) -> None:
         """Tool-centre-point control, on or off."""
-        if (
-            self.dialect not in ("fanuc", "mitsubishi")
-            or self.steps
-            or not self.plain_frame()
-            or self.plane
-            or not self.rotary
-        ):
+        if self.dialect not in MACRO or self.steps or not self.plain_frame() or self.plane or not self.rotary:
             return
         if not self.tcp and self.second:
             return
-        self.tcp = not self.tcp
+        self.tcp, code = not self.tcp, "G49"
         self.length = LENGTHS[self.tool] if self.tcp else 0.0
-        self.alone(f"G43.4 H{self.tool}" if self.tcp else "G49")
+        if self.tcp:
+            code = "G234" if self.dialect == "haas" else chance.choice(["G43.4", "G43.5"])
+        self.pointing = code == "G43.5"
+        self.alone(f"{code} H{self.tool}" if self.tcp else code)
         self.unsaid = set(self.letters)
+
+    def may_swivel(self) -> bool:
+        if self.dialect not in ("fanuc", "mitsubishi") or not self.plain_frame() or self.second:
+            return False
+        self.absolute()
+        self.upright()
+        if not self.length:
+            self.lengths(self.style)
+        return True
+
+    def swivel(self, plane: Frame, target: Vector) -> None:
+        angles = Rotation.from_matrix(plane.turn).as_euler("ZXZ", degrees=True)
+        words = zip("XYZIJK", [*(plane.shift / self.unit), *angles], strict=True)
+        self.alone("G68.2 " + " ".join(f"{letter}{number(value, 9)}" for letter, value in words))
+        self.alone("G53.1", moves=True)
+        self.plane, self.tcp, self.rotation = True, True, plane
+        self.compose()
+
+    def unswivel(self) -> None:
+        self.absolute()
+        self.tilted(self.style)
+
+    def travel(self, target: Vector, *, rapid: bool) -> None:
+        self.go("0" if rapid else "1", target)
 
     def tilted(self, chance: random.Random) -> None:
         """A tilted plane, on or off."""
@@ -445,9 +638,9 @@ class IsoAuthor(Author):
 
     EVENTS: ClassVar[dict[str, float]] = {
         "line": 6, "rapid": 2, "arc": 3, "hole": 2, "machine_place": 0.5, "reference": 0.5, "other_tool": 0.5,
-        "dwell": 0.3, "contour": 0.7, "twice": 0.7,
+        "dwell": 0.3, "contour": 0.7, "twice": 0.7, "corner": 0.7, "tangent": 0.7, "macro": 0.7, "swivelled": 2,
     }  # fmt: skip
     REWRITES: ClassVar[dict[str, float]] = {
-        "increments": 3, "units": 2, "zero": 2, "preset": 1, "offsets": 1, "rotate": 2, "reflect": 1, "lengths": 2,
-        "tip": 2, "tilted": 2, "jump": 1, "loop": 1, "call": 1, "skip": 1, "table": 1,
+        "increments": 3, "units": 2, "feeds": 1, "zero": 2, "preset": 1, "offsets": 1, "rotate": 2, "reflect": 1,
+        "lengths": 2, "tip": 2, "tilted": 2, "jump": 1, "loop": 1, "call": 1, "skip": 1, "table": 1,
     }  # fmt: skip

@@ -6,6 +6,7 @@ import random
 from typing import ClassVar
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from metamorphic.composed_iso import LENGTHS
 from metamorphic.composing import SECOND, Author, Frame, Vector, scaled, shifted, turned
@@ -58,12 +59,24 @@ class KlartextAuthor(Author):
             across = there[:2] - pole
             if np.hypot(*across) > 1.0:
                 self.put(f"CC X{pole[0]:+} Y{pole[1]:+}")
-                rest = self.words(target, "ZABC") if self.letters else []
+                rest = self.words(target, "ZABC")
                 angle = np.degrees(np.arctan2(across[1], across[0]))
                 self.anew -= set("XY")
                 self.move(["LP", f"PR{np.hypot(*across):+.8f}", f"PA{angle:+.9f}", *rest], target, rate)
                 return
-        self.move(["L", *self.words(target)], target, rate)
+        names = set(self.letters[3:])
+        turns = (target[3:] != self.q[3:]).any() or self.unsaid & names
+        vector = self.pointed(target) if self.tcp and turns and self.often(0.4) else None
+        if vector is not None:
+            words = self.words(target, "XYZ")
+            self.unsaid -= names
+            directions = ("T{}{:+.9f}".format(*each) for each in zip("XYZ", vector, strict=True))
+            self.move(["LN", *words, *directions], target, rate)
+        else:
+            self.move(["L", *self.words(target)], target, rate)
+
+    def travel(self, target: Vector, *, rapid: bool) -> None:
+        self.go(target, rapid)
 
     def move(self, words: list[str], target: Vector, rate: str) -> None:
         """A motion block; F stays in force."""
@@ -86,12 +99,20 @@ class KlartextAuthor(Author):
         """A rapid to where it begins, and an arc or a helix."""
         self.go(self.somewhere(chance), rapid=True)
         target, centre, sweep, climb = self.bow(chance)
+        if self.exact:  # a helix is written by its angle, which is rounded
+            target[2], climb = self.q[2], 0.0
+        self.round(target, centre, sweep, climb)
+
+    def round(self, target: Vector, centre: Vector, sweep: float, climb: float = 0.0, tangent: bool = False) -> None:
+        """An arc; `tangent`: it goes on in the direction of the motion before it."""
         right = (sweep > 0) == (np.linalg.det(self.frame.turn[:2, :2]) > 0)
         sense, here, there = "DR+" if right else "DR-", self.place(self.q), self.place(target)
         middle = self.place(np.concatenate([centre, self.q[3:]]))
         choice = self.style.randrange(4) if self.wild else 0
         self.anew -= set("XY")
-        if climb or (choice == 1 and not self.exact):
+        if tangent and choice:
+            self.move(["CT", self.word("X", there[0]), self.word("Y", there[1])], target, "F500")
+        elif climb or (choice == 1 and not self.exact):
             turn = np.degrees(abs(sweep)) * (1 if right else -1)
             self.put(f"CC X{middle[0]:+.6f} Y{middle[1]:+.6f}")
             height = [self.word("Z", there[2])] if climb else []
@@ -111,6 +132,45 @@ class KlartextAuthor(Author):
             step = self.often(0.3)
             i, end = ("I", there - here) if step else ("", there)
             self.move(["C", self.word(i + "X", end[0]), self.word(i + "Y", end[1]), sense], target, "F500")
+
+    def tangent(self, chance: random.Random) -> None:
+        """A line, and an arc that goes on in its direction."""
+        self.go(self.somewhere(chance), rapid=True)
+        first, _, centre, sweep = self.legs(chance)
+        self.go(first)
+        target = first.copy()
+        target[:3] = centre + turned("Z", np.degrees(sweep)).turn @ (first[:3] - centre)
+        self.round(target.round(6), centre, sweep, tangent=True)
+
+    def corner(self, chance: random.Random) -> None:
+        """Two lines with a rounding or a chamfer between them."""
+        self.go(self.somewhere(chance), rapid=True)
+        first, last, _, _ = self.legs(chance)
+        wild, self.wild = self.wild, False
+        self.go(first)
+        self.put(f"{chance.choice(['RND R', 'CHF '])}{2.0 / self.frame.turn[2, 2]}")
+        self.go(last)
+        self.wild = wild
+
+    def macro(self, chance: random.Random) -> None:
+        """Two lines, sometimes by a subprogram that gets their ends."""
+        places = [self.somewhere(chance) for _ in range(2)]
+        self.go(self.q, rapid=True)
+        name, body = 0, "L XQ21 Y+Q22 ZQ23 FQ24"
+        for each in places:
+            if not self.wild:
+                self.go(each)
+                continue
+            self.q = each
+            if not (self.flat and name):
+                name = next(self.names)
+                self.behind += [f"LBL {name}", body, "LBL 0"]
+                self.moving.add(body)
+            for n, value in enumerate((*self.place(each)[:3], 500.0)):
+                self.put(f"FN 0: Q{21 + n} = {value:+.6f}" if self.often(0.5) else f"Q{21 + n} = {value:+.6f}")
+            self.put(f"CALL LBL {name}")
+            self.anew -= set("XYZ")
+        self.rate = "" if self.wild else self.rate
 
     def hole(self, chance: random.Random) -> None:
         """Some holes of one cycle."""
@@ -149,25 +209,48 @@ class KlartextAuthor(Author):
             target = self.q.copy()
             target[:2] = (centre + radius * np.array([np.cos(angle), np.sin(angle)])).round(3)
             self.move(["L", *self.words(target), *([side] if n == 0 else [])], target, "F500")
-        target = self.q + np.array([0.0, 0.0, 10.0, 0.0, 0.0])
+        target = self.q + np.array([0.0, 0.0, 5.0, 0.0, 0.0])
         self.move(["L", *self.words(target), "R0"], target, "F500")
         self.unsaid = set(self.letters)
 
     def twice(self, chance: random.Random) -> None:
         """A stretch that is gone through twice, sometimes as a subprogram with repeats."""
+        relative = chance.random() < 0.3
         places = [self.somewhere(chance, turns=self.rotary) for _ in range(2)]
-        calls = self.often(0.7)
+        rounds = [places, places]
+        if relative:
+            self.upright(chance)
+            self.go(self.q, rapid=True)
+            self.anew -= set("XYZ")
+            by = [(0.1 * (place - self.q)).round(3) for place in places]
+            rounds = [[self.q + n * sum(by) + by[0], self.q + (n + 1) * sum(by)] for n in range(2)]
+        calls = self.style.choice(["", "CALL", "REP"]) if self.wild else ""
         name, outer = next(self.names), self.lines
         if calls:
-            self.put(f"CALL LBL {name}\nCALL LBL {name}")
             self.lines, self.rate = [], ""
-        for each in places * (1 if calls else 2):
-            self.unsaid = set(self.letters)
-            self.move(["L", *(self.word(a, v) for a, v in self.values(each).items())], each, "F500")
+        for each in rounds[0] if calls else [*rounds[0], *rounds[1]]:
+            if not relative:
+                self.unsaid = set(self.letters)
+            words, by_steps = self.values(each).items(), self.place(each) - self.place(self.q)
+            steps = {letter: by_steps[self.letters.index(letter)] for letter, _ in words}
+            forms = (self.word("I" + a, steps[a]) if relative else self.word(a, v) for a, v in words)
+            self.move(["L", *forms], each, "F500")
         if calls:
-            self.behind += [f"LBL {name}", *self.lines, "LBL 0"]
-            self.lines = outer
+            body, self.lines = self.lines, outer
+            if calls == "REP":
+                self.lines += [f"LBL {name}", *body, f"CALL LBL {name} REP 1"]
+            else:
+                self.put(f"CALL LBL {name}\nCALL LBL {name}")
+                self.behind += [f"LBL {name}", *body, "LBL 0"]
+        self.q = rounds[1][-1]
         self.anew -= set("XYZ")
+
+    def upright(self, chance: random.Random) -> None:
+        """No M128, nor a tilted plane."""
+        if self.plane:
+            self.tilted(chance)
+        if self.tcp:
+            self.tip(chance)
 
     def machine_place(self, chance: random.Random) -> None:
         self.put(f"L Z+290 {'R0 ' if self.often(0.5) else ''}FMAX M91", moves=True)
@@ -175,8 +258,7 @@ class KlartextAuthor(Author):
         self.unsaid |= set(self.letters)
 
     def other_tool(self, chance: random.Random) -> None:
-        if self.tcp:
-            self.tilted(chance) if self.plane else self.tip(chance)
+        self.upright(chance)
         self.tool = 3 - self.tool
         self.length = LENGTHS[self.tool]
         self.put(f"TOOL CALL {self.tool} Z S1000")
@@ -266,11 +348,11 @@ class KlartextAuthor(Author):
 
     def tilted(self, chance: random.Random) -> None:
         """A plane with M128, off or on."""
-        if not self.rotary or self.turned_or_scaled() or self.offset is SECOND:
-            return
         if self.plane:
             self.put("PLANE RESET STAY")
             self.plane, self.rotation = False, Frame()
+        elif not self.rotary or self.turned_or_scaled() or self.offset is SECOND:
+            return
         else:
             if not self.tcp:
                 self.tip(chance)
@@ -283,6 +365,30 @@ class KlartextAuthor(Author):
             self.put(words)
             self.plane, self.rotation = True, turn
         self.unsaid = set(self.letters)
+        self.compose()
+
+    def may_swivel(self) -> bool:
+        if self.turned_or_scaled() or self.offset is SECOND:
+            return False
+        self.upright(self.style)
+        return True
+
+    def swivel(self, plane: Frame, target: Vector) -> None:
+        turn = plane.turn
+        a, b, c = Rotation.from_matrix(turn).as_euler("ZYX", degrees=True)[::-1]
+        first, nutation, last = Rotation.from_matrix(turn).as_euler("ZXZ", degrees=True)
+        words = self.style.choice([
+            f"SPATIAL SPA{a:+.9f} SPB{b:+.9f} SPC{c:+.9f}",
+            f"EULER EULPR{first:+.9f} EULNU{nutation:+.9f} EULROT{last:+.9f}",
+            "VECTOR BX{:+.9f} BY{:+.9f} BZ{:+.9f} NX{:+.9f} NY{:+.9f} NZ{:+.9f}".format(*turn[:, 0], *turn[:, 2]),
+        ])  # fmt: skip
+        self.put(f"PLANE {words} TURN FMAX SEQ{'+' if target[3] > 0 else '-'}", moves=True)
+        self.plane, self.tcp, self.rotation = True, True, Frame(turn)
+        self.compose()
+
+    def unswivel(self) -> None:
+        self.put("PLANE RESET STAY")
+        self.plane, self.tcp, self.rotation = False, False, Frame()
         self.compose()
 
     def jump(self, chance: random.Random) -> None:
@@ -321,7 +427,7 @@ class KlartextAuthor(Author):
 
     EVENTS: ClassVar[dict[str, float]] = {
         "line": 6, "rapid": 2, "arc": 3, "hole": 2, "machine_place": 0.5, "other_tool": 0.5, "dwell": 0.3,
-        "contour": 0.7, "twice": 0.7,
+        "contour": 0.7, "twice": 0.7, "corner": 0.7, "tangent": 0.7, "macro": 0.7, "swivelled": 2,
     }  # fmt: skip
     REWRITES: ClassVar[dict[str, float]] = {
         "datum": 3, "rotate": 2, "reflect": 1, "magnify": 1, "presets": 1, "tip": 2, "tilted": 2, "jump": 1, "call": 1,

@@ -6,6 +6,7 @@ import random
 from typing import ClassVar
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from metamorphic.composed_iso import LENGTHS, IsoAuthor
 from metamorphic.composing import Frame, Vector, number, scaled, shifted, turned
@@ -19,7 +20,7 @@ class SiemensAuthor(IsoAuthor):
     def begin(self) -> None:
         super().begin()
         self.anew, self.length, self.rate = set[str](), LENGTHS[1], 1.0
-        self.lines = ["G710 G17 G40 G90 G94", "T1 D1 M6", "G54"]
+        self.lines = ["G710 G17 G40 G90 G94 S1000", "T1 D1 M6", "G54"]
 
     def finish(self) -> str:
         head = ["%_N_PART_MPF"] if self.behind else []
@@ -38,14 +39,14 @@ class SiemensAuthor(IsoAuthor):
         return f"{letter}={text}" if self.often(0.1) else letter + text
 
     def motion(self, code: str, words: list[str]) -> None:
-        feed = f"F{number(500.0 / self.rate, 5)}"
-        if code == "0" or (feed == self.fed and self.often(0.7)):
+        feed = self.feed()
+        if code == "0" or (feed == self.fed and self.rates != "G93" and self.often(0.7)):
             feed = ""
         else:
             self.fed = feed
         if self.often(0.3):
             self.style.shuffle(words)
-        parts = [*([] if code == self.code and self.often(0.6) else [code if code == "CIP" else f"G{code}"]), *words]
+        parts = [*([] if code == self.code and self.often(0.6) else [code if code.isalpha() else f"G{code}"]), *words]
         self.code = code
         self.put(self.prefix + " ".join([*parts, *([feed] if feed else [])]), moves=True)
         self.prefix = ""
@@ -57,13 +58,22 @@ class SiemensAuthor(IsoAuthor):
         here, there = self.place(self.q), self.place(target)
         words, owed = [], self.unsaid | self.anew
         polar = extra is None and not self.steps and not self.diameter and not self.exact and self.often(0.1)
+        if extra is None:
+            self.way = float(np.linalg.norm((target - self.q)[:3]))
         values = self.values(target)
         self.anew = self.anew - set(values)
+        self.pointing = self.tcp and self.often(0.3)
+        vector = self.directed(target, values)
         for letter, value in values.items():
             n = self.letters.index(letter)
             if letter == "X" and self.diameter:
                 value *= 2.0
-            if n < 3 and self.often(0.1) and not (letter == "X" and self.diameter) and not owed:
+            if self.repeated or owed:
+                words.append(self.word(letter, value))
+            elif letter == "C" and min(here[n], there[n]) > 0 and self.often(0.2):
+                form = self.style.choice(["DC", "ACP" if there[n] > here[n] else "ACN"])
+                words.append(f"C={form}({number(there[n], 6)})")
+            elif n < 3 and self.often(0.1) and not (letter == "X" and self.diameter):
                 scale = self.unit if n < 3 else 1.0
                 other = there[n] if self.steps else there[n] - here[n]
                 words.append(f"{letter}={'AC' if self.steps else 'IC'}({number(other / scale, 6)})")
@@ -78,35 +88,59 @@ class SiemensAuthor(IsoAuthor):
                 words = [each for each in words if each[0] not in "XY"]
                 words += [f"AP={number(angle, 9)}", f"RP={number(np.hypot(*across), 8)}"]
         self.q = target
-        self.motion(code, [*words, *(extra or [])])
+        self.motion(code, [*words, *vector, *(extra or [])])
         if steps:
             self.increments(self.style)
 
-    diameter = False
+    def directed(self, target: Vector, values: dict[str, float]) -> list[str]:
+        vector = super().directed(target, values)
+        return [f"{'ABC'['IJK'.index(word[0])]}3={word[1:]}" for word in vector]
 
     # -- events -------------------------------------------------------------------------------------------------------
 
-    def circle(self, right: bool, middle: Vector, target: Vector, sweep: float) -> tuple[str, list[str]]:
-        i, j = middle
+    def square_up(self) -> None:
+        if np.abs(self.frame.turn[:, 2] * self.frame.turn[2]).sum() != 1.0 or self.frame.turn[0, 1]:
+            self.alone("ROT")
+            self.frame, self.anew = Frame(), set("XYZ")
+
+    def circle(
+        self, right: bool, middle: Vector, target: Vector, sweep: float, plane: list[int], tangent: bool
+    ) -> tuple[str, list[str]]:
         choice = self.style.randrange(5) if self.wild else 0
         code = "3" if right else "2"
+        if tangent and choice:
+            return "CT", []
         if choice == 1:
-            return code, [f"CR={number(np.hypot(i, j) * (1 if abs(sweep) < np.pi else -1), 7)}"]
-        here = self.place(self.q)[:3] / self.unit
+            return code, [f"CR={number(np.linalg.norm(middle[plane]) * (1 if abs(sweep) < np.pi else -1), 7)}"]
+        here, there = self.place(self.q)[:3] / self.unit, self.place(target)[:3] / self.unit
+        centre = here + middle
         if choice == 2 and not self.diameter:
-            return code, [f"I=AC({number(here[0] + i, 6)})", f"J=AC({number(here[1] + j, 6)})"]
-        if choice == 3 and target[2] == self.q[2] and not self.steps and not self.diameter:
-            turn = turned("Z", np.degrees(abs(sweep) / 2 * (1 if right else -1))).turn[:2, :2]
-            point = here[:2] + (i, j) + turn @ -np.array([i, j])
-            height = (here[2] + self.place(target)[2] / self.unit) / 2
-            return "CIP", [f"I1={number(point[0], 7)}", f"J1={number(point[1], 7)}", f"K1={number(height, 7)}"]
+            return code, [f"{'IJK'[n]}=AC({number(centre[n], 6)})" for n in plane]
+        (across,) = {0, 1, 2} - set(plane)
+        if choice == 3 and abs(there[across] - here[across]) < 1e-9 and not self.steps and not self.diameter:
+            half = turned("XYZ"[across], np.degrees(abs(sweep) / 2 * (1 if right else -1))).turn
+            point = centre - half @ middle
+            point[across] = here[across]
+            return "CIP", [f"{'IJK'[n]}1={number(point[n], 7)}" for n in range(3)]
         if choice == 4:
             return code, [f"AR={number(np.degrees(abs(sweep)), 8)}"]
-        return code, [f"I{number(i, 6)}", f"J{number(j, 6)}"]
+        return code, [f"{'IJK'[n]}{number(middle[n], 6)}" for n in plane]
+
+    def rounded(self, chance: random.Random, size: str) -> list[str]:
+        return [f"{chance.choice(['RND', 'CHF', 'CHR'])}={size}"]
+
+    def defined(self, name: int) -> None:
+        line = "G1 X=WA Y=WB Z=WC F=WF"
+        self.behind += [f"%_N_SUB{name}_SPF", f"PROC SUB{name}(REAL WA, REAL WB, REAL WC, REAL WF)", line, "M17"]
+        self.moving.add(line)
+
+    def given(self, name: int, values: list[str]) -> str:
+        return f"SUB{name}({','.join(values)})"
 
     def hole(self, chance: random.Random) -> None:
         """Some holes of one cycle, called by MCALL."""
         self.go("0", self.somewhere(chance))
+        self.minutes()
         if self.steps:
             self.steps = False
             self.alone("G90")
@@ -147,16 +181,18 @@ class SiemensAuthor(IsoAuthor):
         self.rapid(chance)
 
     def other_tool(self, chance: random.Random) -> None:
-        if self.tcp:
-            self.absolute()
-            self.tip(chance)
+        self.upright()
         self.tool = 3 - self.tool
         self.length = LENGTHS[self.tool]
         self.alone(f"T{self.tool} D1 M6")
         self.unsaid, self.code = set(self.letters), ""
 
-    def called_twice(self, name: int) -> str:
-        return f"SUB{name} P2"
+    def put_twice(self, name: int, body: list[str]) -> None:
+        if self.style.random() < 0.5:
+            self.put(f"SUB{name} P2")
+            self.behind += self.subprogram(name, body)
+        else:
+            self.lines += [f"LAB{name}:", *body, f"END{name}:", f"REPEAT LAB{name} END{name} P=1"]
 
     def subprogram(self, name: int, body: list[str]) -> list[str]:
         return [f"%_N_SUB{name}_SPF", *body, "M17"]
@@ -169,7 +205,7 @@ class SiemensAuthor(IsoAuthor):
     def units(self, chance: random.Random) -> None:
         self.unit = 25.4 if self.unit == 1.0 else 1.0
         whole = chance.random() < 0.7
-        self.rate = self.unit if whole else 1.0
+        self.rate, self.metric = self.unit if whole else 1.0, self.metric or not whole
         codes = ("G710", "G700") if whole else ("G71", "G70")
         self.mode(codes[self.unit != 1.0])
         self.fed = ""
@@ -229,6 +265,28 @@ class SiemensAuthor(IsoAuthor):
         self.alone("G54")
         self.unsaid, self.anew = set(self.letters), set("XYZ")
 
+    def may_swivel(self) -> bool:
+        if self.second:
+            return False
+        self.absolute()
+        self.upright()
+        self.alone("TRANS")
+        self.frame, self.anew = Frame(), set("XYZ")
+        if not self.length:
+            self.lengths(self.style)
+        return True
+
+    def swivel(self, plane: Frame, target: Vector) -> None:
+        angles = Rotation.from_matrix(plane.turn).as_euler("XYZ", degrees=True)
+        words = ",".join(number(each, 9) for each in (*(plane.shift / self.unit), *angles))
+        self.alone(f'CYCLE800(0,"T",200000,57,{words},0,0,0,{1 if target[3] > 0 else -1})', moves=True)
+        self.tcp, self.frame = True, plane
+
+    def unswivel(self) -> None:
+        self.absolute()
+        self.alone("CYCLE800()")
+        self.tcp, self.frame = False, Frame()
+
     def diameters(self, chance: random.Random) -> None:
         """X as a diameter, off or on."""
         if self.rotary or (self.frame.turn - np.eye(3)).any() or self.frame.shift.any():
@@ -256,14 +314,16 @@ class SiemensAuthor(IsoAuthor):
         name, outer, save = f"SUB{next(self.names)}", self.lines, chance.random() < 0.4 and not self.tcp
         if save and self.diameter:
             self.diameters(chance)
+        if save:
+            self.minutes()
         self.alone(name)
         self.lines = [f"%_N_{name}_SPF", f"PROC {name}" + (" SAVE" if save else "")]
         kept = self.frame, self.offset, self.kept, self.second, self.steps, self.unit, self.rate
 
         def close() -> None:
-            if save and self.tcp:
-                self.absolute()
-                self.tip(chance)
+            if save:
+                self.upright()
+                self.minutes()
             if save and self.diameter:
                 self.diameters(chance)
             if save and (self.offset is not kept[1]):
@@ -280,6 +340,6 @@ class SiemensAuthor(IsoAuthor):
         self.wrap(chance, close)
 
     REWRITES: ClassVar[dict[str, float]] = {
-        "increments": 3, "units": 2, "frames": 6, "offsets": 2, "lengths": 2, "tip": 2, "diameters": 1, "jump": 1,
-        "loop": 1, "call": 1, "skip": 1,
+        "increments": 3, "units": 2, "feeds": 1, "frames": 6, "offsets": 2, "lengths": 2, "tip": 2, "diameters": 1,
+        "jump": 1, "loop": 1, "call": 1, "skip": 1,
     }  # fmt: skip

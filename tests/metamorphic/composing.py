@@ -20,7 +20,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_flat, fix_program
 from ncfix.compensate.following import kinematics_of, placed, rotary_names
 from ncfix.compensate.plan.kinematics import commands_from_joints
-from ncfix.control.moves import MotionKind
+from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
 from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
 from ncfix.machine import Machine
@@ -28,8 +28,12 @@ from ncfix.text.reader import read
 
 Vector = NDArray[np.float64]
 
-PLANAR = ("arc", "hole", "contour")
-"""Events in the plane XY of a tool that stands upright."""
+PLANAR = ("arc", "hole", "contour", "corner", "tangent")
+"""Events in the planes of a tool that stands upright."""
+PLANES = {"Z": [0, 1], "Y": [2, 0], "X": [1, 2]}
+"""The two axes of a plane by the axis across it."""
+TURNING = ("swivelled",)
+"""Events of a tool that turns."""
 SAME = 3e-4
 """mm: paths are one and the same, but for six digits in inches, in turned and scaled coordinates."""
 ROUNDED, ROUNDED_TURNED = 5e-4, 1.5e-3
@@ -38,6 +42,8 @@ have steps of 0.0001 degree, which X Y Z make up for at levers of some 100 mm.""
 
 SECOND = {"X": 7.5, "Y": -4.25, "Z": 52.0, "A": 0.0, "B": 0.0, "C": 12.0}
 """Another work offset."""
+FEED, SPEED = 500.0, 1000.0
+"""mm/min, and revolutions of the spindle per minute."""
 SHORT = 65.5
 """The length of another tool, mm."""
 COMPOSED = replace(
@@ -45,6 +51,7 @@ COMPOSED = replace(
     work_offsets=SETUP.work_offsets
     | {"G55": SECOND, "PRESET": SETUP.work_offsets["G54"], "PRESET1": SETUP.work_offsets["G54"], "PRESET2": SECOND},
     tools={0: Tool(LENGTH, 3.0), 1: Tool(LENGTH, 3.0), 2: Tool(SHORT, 2.0)},
+    variables={"$SC_TOOL_LENGTH_CONST": 17.0},
     references={code: {"X": 0.0, "Y": 0.0, "Z": 290.0} for code in ("G28", "G74")},
 )
 
@@ -82,7 +89,7 @@ def scaled(*factors: float) -> Frame:
 
 def turned(axis: str, degrees: float, centre: Sequence[float] = (0.0, 0.0, 0.0)) -> Frame:
     """Turned about an axis through a point, right-handed."""
-    i, j = {"X": (1, 2), "Y": (2, 0), "Z": (0, 1)}[axis]
+    i, j = PLANES[axis]
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     turn = np.eye(3)
     turn[[i, i, j, j], [i, j, i, j]] = c, -s, s, c
@@ -106,12 +113,14 @@ class Author:
     tcp      X Y Z are the tip in the workpiece
     steps    words are increments
     unsaid   axes which the program has to name
+    metric   F is in mm though words are in inches: feeds are not compared
     text     what was written
     rotary, exact, flat  the tool turns; nothing may be rounded on the way; the program will be written out flat
     """
 
     comment = "; here"
     text = ""
+    metric = False
     rotary = False
     exact = False
     flat = False
@@ -190,15 +199,76 @@ class Author:
             q[axis] = round(low[axis] + chance.random() * (80, 80, 80, 80, 180)[axis], chance.choice([1, 2, 3]))
         return q
 
-    def bow(self, chance: random.Random) -> tuple[Vector, Vector, float, float]:
-        """An arc in the plane XY, or a helix: where it ends, its centre, its sweep, rad, and how far it climbs."""
+    def bow(self, chance: random.Random, across: str = "Z") -> tuple[Vector, Vector, float, float]:
+        """An arc in a plane, or a helix: where it ends, its centre, its sweep, rad, and how far it climbs."""
         radius, side = chance.uniform(3, 15), np.radians(chance.uniform(0, 360))
         sweep = np.radians(chance.choice([-1, 1]) * chance.choice([chance.uniform(20, 160), chance.uniform(200, 340)]))
         climb = chance.choice([0.0, chance.uniform(-5, 5)])
-        from_centre = radius * np.array([np.cos(side), np.sin(side), 0.0])
+        from_centre, along = np.zeros(3), np.eye(3)["XYZ".index(across)]
+        from_centre[PLANES[across]] = radius * np.cos(side), radius * np.sin(side)
         centre, target = self.q[:3] - from_centre, self.q.copy()
-        target[:3] = centre + turned("Z", np.degrees(sweep)).turn @ from_centre + (0.0, 0.0, climb)
+        target[:3] = centre + turned(across, np.degrees(sweep)).turn @ from_centre + climb * along
         return target.round(6), centre, sweep, climb
+
+    def legs(self, chance: random.Random) -> tuple[Vector, Vector, Vector, float]:
+        """A line in the plane XY and what goes on behind it: where it ends, where a line from there to one side ends,
+        the centre of an arc that goes on in its direction, and the sweep of the arc, rad."""
+        way, turn = np.radians(chance.uniform(0, 360)), chance.choice([-1, 1]) * np.radians(chance.uniform(30, 140))
+        first = self.q.copy()
+        first[:2] = (first[:2] + 20.0 * np.array([np.cos(way), np.sin(way)])).round(3)
+        way = np.arctan2(*(first - self.q)[1::-1])
+        last, centre = first.copy(), first[:3].copy()
+        last[:2] = (last[:2] + 20.0 * np.array([np.cos(way + turn), np.sin(way + turn)])).round(3)
+        centre[:2] += np.sign(turn) * 12.0 * np.array([-np.sin(way), np.cos(way)])
+        return first, last, centre, turn
+
+    def pointed(self, target: Vector) -> Vector | None:
+        """The direction of the tool at a position, in coordinates of the program; None: the nearest way there may be
+        another one, or the frame is no plain rotation."""
+        (a, c), (tilt, turn) = target[3:], self.q[3:]
+        if a * tilt < 9.0 or abs(a - tilt) + abs(c - turn) > 60.0 or not np.allclose(np.linalg.det(self.frame.turn), 1):
+            return None
+        return self.frame.turn.T @ self.posture(target)[:, 2]
+
+    def posture(self, q: Vector) -> Vector:
+        """How the tool stands in the workpiece (3, 3)."""
+        columns = [self.letters.index(name) for name in self.machine.axis_names]
+        joints = np.where(self.machine.rotary, np.radians(q[columns]), q[columns])
+        return np.asarray(self.placed.nominal(joints, self.length))[:3, :3]
+
+    def swivelled(self, chance: random.Random) -> None:
+        """The tool turned, then lines square to it: sometimes in a plane to which the control turns it."""
+        target, spin = self.q.copy(), chance.uniform(-180, 180)
+        target[3:] = self.somewhere(chance, turns=True)[3:]
+        origin = [round(chance.uniform(-10, 10), 2) for _ in range(3)]
+        tilted = self.wild and self.may_swivel() and self.pointed(target) is not None
+        if tilted:
+            plane = shifted(*origin) @ Frame(self.posture(target) @ turned("Z", spin).turn)
+            self.swivel(plane, target)
+            self.q, self.unsaid = target, set("XYZ")
+        else:
+            self.travel(target, rapid=True)
+        for rapid in (True, False):
+            self.travel(self.somewhere(chance), rapid=rapid)
+        if tilted:
+            self.unswivel()
+            self.unsaid = set(self.letters)
+
+    def may_swivel(self) -> bool:
+        """Make ready for a plane to which the control turns; False: it cannot."""
+        raise NotImplementedError
+
+    def swivel(self, plane: Frame, target: Vector) -> None:
+        """Turn to a plane, in which the axes stand at a position."""
+        raise NotImplementedError
+
+    def unswivel(self) -> None:
+        """Leave that plane."""
+        raise NotImplementedError
+
+    def travel(self, target: Vector, *, rapid: bool) -> None:
+        """A straight motion."""
+        raise NotImplementedError
 
     def values(self, target: Vector) -> dict[str, float]:
         """The words of a motion, in units of the program: those that it needs, and sometimes all."""
@@ -237,11 +307,13 @@ class Composition(NamedTuple):
 
 
 class Corrected(NamedTuple):
-    """A program that was corrected: its motions (n, k) before and behind, why some were refused, and what passed."""
+    """A program that was corrected: its motions (n, k) before and behind, which of them (n,) are passed in the end, why
+    some were refused, and how many pass by which rule."""
 
     text: str
     before: Vector
     after: Vector
+    passes: NDArray[np.bool_]
     refused: Sequence[str]
     passed: Mapping[str, int]
 
@@ -254,7 +326,8 @@ def compose(author: type[Author], dialect: str, machines: Sequence[Machine], see
     if not exact:
         machine = machine.replace(effects=tuple(e for e in machine.effects if not e.basis.needs_direction))
     strategy = chance.choice(["position", "full", "rotary-then-linear"])
-    events = {each: share for each, share in author.EVENTS.items() if not (rotary and each in PLANAR)}
+    others = PLANAR if rotary else TURNING
+    events = {each: share for each, share in author.EVENTS.items() if each not in others}
     left_out = {"units"} if exact else {"increments"} if rotary and strategy == "full" else set()
     rewrites = {each: share for each, share in author.REWRITES.items() if each not in left_out}
     own = type(author.__name__, (author,), {"rotary": rotary, "exact": exact, "flat": flat})
@@ -266,23 +339,36 @@ def compose(author: type[Author], dialect: str, machines: Sequence[Machine], see
     return Composition(own, dialect, machine, setup, replace(OPTIONS, strategy=strategy, flatten=flat), items)
 
 
-def motions(source: bytes, made: Composition) -> Vector:
-    """What there is to say of the motions of a program: where they end, the circle, how fast, the tool."""
+def motions(source: bytes, made: Composition) -> tuple[Vector, NDArray[np.bool_]]:
+    """What there is to say of the motions of a program: where they end, the circle, the tool, how fast; which pass."""
     names, rotary = made.machine.axis_names, rotary_names(made.machine)
     program = read(source, "part", made.dialect)
     moves = trace(program, made.setup, names, rotary, kinematics=kinematics_of(made.machine)).moves
     rows = np.flatnonzero(moves.kind != MotionKind.DWELL)
-    columns = (moves.kind, *(moves.sweep * moves.normal.T), *moves.centre.T, moves.tool_length)
-    return np.column_stack([ends(moves, made.machine), *(column[rows] for column in columns)])
+    columns = (moves.kind, *(moves.sweep * moves.normal.T), *moves.centre.T, moves.tool_length, speeds(moves))
+    said = np.column_stack([ends(moves, made.machine), *(column[rows] for column in columns)])
+    return said, moves.rule[rows] == Rule.PASS
+
+
+def speeds(moves: Moves) -> Vector:
+    """The feed of each motion as a share of FEED; NaN where axes turn, or nothing moves."""
+    linear = [moves.axes.index(letter) for letter in "XYZ"]
+    ways = np.linalg.norm((moves.end - moves.start)[:, linear], axis=1)
+    round_about = np.linalg.norm(np.cross(moves.start[:, linear] - moves.centre, moves.normal), axis=1)
+    ways = np.where(moves.kind == MotionKind.ARC, round_about * np.abs(moves.sweep), ways)
+    modes = [moves.feed_mode == mode for mode in (FeedMode.INVERSE_TIME, FeedMode.PER_REVOLUTION)]
+    turns = (moves.end != moves.start)[:, moves.rotary].any(axis=1)
+    known = (moves.kind != MotionKind.RAPID) & (moves.kind != MotionKind.CYCLE) & (ways > 0.1) & ~turns
+    return np.where(known, moves.feed * np.select(modes, [ways, SPEED], 1.0) / FEED, np.nan)
 
 
 def corrected(text: str, made: Composition) -> Corrected:
     """Correct a program, and follow it before and behind."""
     fixed = fix_flat if made.options.flatten else fix_program
     done = fixed(read(text.encode(), "part", made.dialect), made.machine, made.setup, made.options)
-    before, after = (motions(each, made) for each in (text.encode(), done.text))
+    (before, _), (after, passes) = (motions(each, made) for each in (text.encode(), done.text))
     refused = [f"{each.code} {each.reason}" for each in done.report.refused]
-    return Corrected(done.text.decode(), before, after, refused, done.report.passed_by_rule)
+    return Corrected(done.text.decode(), before, after, passes, refused, done.report.passed_by_rule)
 
 
 def difference(made: Composition, refusals: Sequence[str] = ()) -> str:
@@ -292,18 +378,20 @@ def difference(made: Composition, refusals: Sequence[str] = ()) -> str:
     """
     plain, wild = made.written(wild=False), made.written(wild=True)
     one, other = corrected(plain.text, made), corrected(wild.text, made)
-    if one.before.shape != other.before.shape or far(one.before, other.before) > SAME:
+    compared = slice(None, -1 if wild.metric else None)
+    if one.before.shape != other.before.shape or far(*(each.before[:, compared] for each in (one, other))) > SAME:
         return "it is another path"
     why = [each for each in other.refused if not any(known in each for known in refusals)]
     if one.refused or why:
         return f"refused: {one.refused or why}"
     if other.refused:
         return ""
-    if one.passed != other.passed or one.after.shape != other.after.shape:
+    kinds = {each.kind for each in made.items}
+    if ("swivelled" not in kinds and one.passed != other.passed) or one.after.shape != other.after.shape:
         return f"{one.passed} passed, or {other.passed}"
     axes = len(made.machine.axis_names)
-    if not ("tilted" in {each.kind for each in made.items} and made.options.strategy == "full"):
-        off = far(one.after[:, :axes], other.after[:, :axes])
+    if not (kinds & {"tilted", "swivelled"} and made.options.strategy == "full"):
+        off = far(*(each.after[~other.passes, :axes] for each in (one, other)))
         if off > (ROUNDED_TURNED if made.options.strategy == "full" else ROUNDED):
             return f"corrected ends are {off * 1e3:.1f} um or mdeg apart"
     return "" if made.options.flatten else changed_beside(wild, other, made)

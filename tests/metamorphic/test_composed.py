@@ -47,6 +47,15 @@ def test_a_composition_is_corrected_as_its_path(dialect: str, root: Path, figure
 
 
 FOUND = {
+    "polar words to where the tool stands": """G710 G17 G40 G90 G94
+T1 D1 M6
+G54
+G0 X10.123456 Y0 Z50 A0 C0
+G111 X0 Y0
+G1 AP=0 RP=10.123456 F500
+G1 X0 Y0 Z0
+M30
+""",
     "arc to a computed increment": """BEGIN PGM R MM
 TOOL CALL 1 Z
 L X-24.680000 Y-24.733 Z12.981 A+0.000000 C+0.000000 FMAX
@@ -72,5 +81,6 @@ END PGM R MM
 @pytest.mark.parametrize("name", FOUND)
 def test_what_compositions_have_found(name: str, root: Path) -> None:
     machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
-    made = Composition(KlartextAuthor, "heidenhain", machine, COMPOSED, OPTIONS, ())
+    dialect = "heidenhain" if FOUND[name].startswith("BEGIN") else "siemens"
+    made = Composition(AUTHORS[dialect], dialect, machine, COMPOSED, OPTIONS, ())
     assert not corrected(FOUND[name], made).refused

@@ -205,8 +205,8 @@ class BlockWriter(BlockText):
         """A word for where an axis stands: the first line of what was an arc is a motion, even if it goes nowhere."""
         for column, letter in self.columns:
             if self._may_add(column) and np.isfinite(position[column]):
-                place = 0.0 if self.incremental else float(position[column])
-                self._add(letter, place, int(self.target.decimals[column]))
+                base = position[column] if self.incremental else 0.0
+                position[column] = base + self._add(letter, position[column] - base, int(self.target.decimals[column]))
                 return
 
     def _closed(self, position: FloatArray, end: FloatArray) -> NDArray[np.bool_]:
