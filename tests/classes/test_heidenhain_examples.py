@@ -130,6 +130,14 @@ def test_a_plane_that_the_axes_do_not_stand_square_to_is_refused(root: Path) -> 
     assert "square" in moves.reasons[moves.reason[-1]] or "normal" in moves.reasons[moves.reason[-1]]
 
 
+@pytest.mark.parametrize(("b", "c"), [(40, 180), (0, 30), (0, -200)])
+def test_plane_axial_turns_the_axes_to_what_it_says(root: Path, b: int, c: int) -> None:
+    moves = moves_of(root, program("L B+10 C-170 FMAX", f"PLANE AXIAL B{b:+} C{c:+} TURN FMAX", "L X+5 Y+6 Z+7 FMAX"))
+    turned = np.degrees(moves.end[-1, [moves.axes.index("B"), moves.axes.index("C")]])
+    assert moves.rule[-1] == 0
+    assert np.abs(turned - (b, c)).max() < 1e-9
+
+
 def test_cycle_19_is_understood_by_where_the_axes_stand(root: Path) -> None:
     by_plane = moves_of(root, program("PLANE AXIAL B+40 C+30 TURN", "L B+40 C+30 FMAX", "L X+5 Y+6 Z+7 FMAX"))
     by_axes = moves_of(

@@ -375,16 +375,24 @@ class KlartextAuthor(Author):
 
     def swivel(self, plane: Frame, target: Vector) -> None:
         turn = plane.turn
+        if self.style.random() < 0.25:
+            turn = self.posture(target)
+            words = f"AXIAL {self.letters[3]}{target[3]:+} C{target[4]:+} TURN FMAX"
+        else:
+            words = self.plane_words(turn) + f" TURN FMAX SEQ{'+' if target[3] > 0 else '-'}"
+        self.put(f"PLANE {words}", moves=True)
+        self.plane, self.tcp, self.rotation = True, True, Frame(turn)
+        self.compose()
+
+    def plane_words(self, turn: Vector) -> str:
+        """A plane in one of many ways."""
         a, b, c = Rotation.from_matrix(turn).as_euler("ZYX", degrees=True)[::-1]
         first, nutation, last = Rotation.from_matrix(turn).as_euler("ZXZ", degrees=True)
-        words = self.style.choice([
+        return self.style.choice([
             f"SPATIAL SPA{a:+.9f} SPB{b:+.9f} SPC{c:+.9f}",
             f"EULER EULPR{first:+.9f} EULNU{nutation:+.9f} EULROT{last:+.9f}",
             "VECTOR BX{:+.9f} BY{:+.9f} BZ{:+.9f} NX{:+.9f} NY{:+.9f} NZ{:+.9f}".format(*turn[:, 0], *turn[:, 2]),
         ])  # fmt: skip
-        self.put(f"PLANE {words} TURN FMAX SEQ{'+' if target[3] > 0 else '-'}", moves=True)
-        self.plane, self.tcp, self.rotation = True, True, Frame(turn)
-        self.compose()
 
     def unswivel(self) -> None:
         self.put("PLANE RESET STAY")

@@ -378,9 +378,12 @@ def is_idle(control: KlartextControl, flags: frozenset[str]) -> bool:
 
 
 def by_axes(control: KlartextControl, values: Values, flags: frozenset[str]) -> None:
-    """PLANE AXIAL: the plane to which rotary axes at these positions make the tool normal."""
-    plane = plane_of(control, values)
-    tilt_to(control, plane or control.frames.plane.rotation, flags, "" if plane else NO_KINEMATICS)
+    """PLANE AXIAL: the plane to which rotary axes at these positions make the tool normal. TURN goes to just these."""
+    way = {index: values[letter] * DEGREE for letter, index in INDEX.items() if letter in values}
+    staying = {index: control.position[index] for index in control.turning if index not in way}
+    plane = None if staying.keys() & control.unknown.keys() else plane_of(control, values)
+    refusal = "" if plane else NO_KINEMATICS
+    tilt_to(control, plane or control.frames.plane.rotation, flags, refusal, staying | way)
 
 
 def plane_of(control: KlartextControl, values: Values) -> Rotation | None:
@@ -393,14 +396,21 @@ def plane_of(control: KlartextControl, values: Values) -> Rotation | None:
     return None if found is None or math.dist(found.tool, normal_of(found.axes)) > 1e-6 else found.axes
 
 
-def tilt_to(control: KlartextControl, tilt: Rotation | None, flags: frozenset[str], refusal: str = "") -> None:
-    """Make a tilted plane the frame; None: none."""
+def tilt_to(
+    control: KlartextControl,
+    tilt: Rotation | None,
+    flags: frozenset[str],
+    refusal: str = "",
+    way: dict[int, float] | None = None,
+) -> None:
+    """Make a tilted plane the frame; None: none. `way`: where the rotary axes go, if the block says it."""
     frames, control.plane_tilted = with_plane(control, tilt), tilt is not None
     control.resume(TILTED)
     if refusal:
         control.suspend(TILTED, refusal)
     home = tilt is None and flags & {"turn", "move"}
-    way = None if refusal else way_home(control) if home else chosen_way(control, tilt, flags)
+    if refusal or way is None:
+        way = None if refusal else way_home(control) if home else chosen_way(control, tilt, flags)
     for letter, name in zip("ABC", CALCULATED, strict=True):
         known = way is not None and INDEX[letter] in way
         angle = way[INDEX[letter]] - control.offset[INDEX[letter]] if way is not None and known else 0.0
