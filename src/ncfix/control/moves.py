@@ -379,7 +379,7 @@ PASS_RULES: Mapping[Pass, PassRule] = {
         "probing", STRAIGHT, False, "It ends where the probe switches, and what it measures must stay comparable."
     ),
     Pass.UNSAID: PassRule(
-        "rapid before the program has placed an axis",
+        "rapid while an axis has not been said",
         RAPIDS,
         False,
         "Its correction would need a word for an axis that the program has not brought to a place of its own yet. It "
