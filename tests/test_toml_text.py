@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from ncfix.toml_text import key_lines, line_of
 
 TEXT = '''\
@@ -59,3 +61,16 @@ def test_a_key_inside_a_line_is_placed_on_its_table() -> None:
     lines = key_lines("a = 1\nincrement = { linear = 1, rotary = 2 }\n")
     assert line_of(("increment", "rotary"), lines) == 2
     assert line_of(("nowhere", 3, "at all"), lines) == 1
+
+
+@pytest.mark.parametrize(
+    ("first", "line"),
+    [
+        ('a = "x"  # """', 2),
+        ('a = \'"""\'', 2),
+        ('a = """x"""', 2),
+        ("a = \"\"\"x\n'''\n\"\"\"  # '''", 4),
+    ],
+)
+def test_what_only_looks_like_the_begin_of_a_long_text(first: str, line: int) -> None:
+    assert key_lines(f"{first}\nb = 2\n")[("b",)] == line

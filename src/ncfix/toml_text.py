@@ -28,7 +28,10 @@ KEY = rf"""(?:{BARE}|"[^"\n]*"|'[^'\n]*')"""
 DOTTED = rf"{KEY}(?:\s*\.\s*{KEY})*"
 HEADER = re.compile(rf"\s*(\[\[?)\s*({DOTTED})\s*\]")
 ASSIGNMENT = re.compile(rf"\s*({DOTTED})\s*=")
-QUOTES = re.compile(r'"""|\'\'\'')
+LONG_TEXTS = ('"""', "'''")
+"""What texts of several lines stand between."""
+QUOTED = re.compile(r'"""|\'\'\'|"(?:[^"\\]|\\.)*"|\'[^\']*\'|#.*')
+"""Such a mark, a text in one line, or a comment."""
 OTHERS = {
     "a measurement": re.compile(r"# *ncfix-measurement"),
     "an NC program": re.compile(r"\s*(?:[%;(]|[NOG][\d.]++[ \t]*+(?!=)|\d*\s*BEGIN PGM)"),
@@ -88,17 +91,30 @@ def key_lines(text: str) -> Mapping[Path, int]:
     table: Path = ()
     quote = ""
     for number, line in enumerate(text.split("\n"), start=1):
-        if quote:
-            quote = "" if line.count(quote) % 2 else quote
+        before, quote = quote, _left_open(line, quote)
+        if before:
             continue
         if header := HEADER.match(line):
             table = _opened(_keys(header[2]), header[1] == "[[", counts)
             _note(table, 0, number, lines)
         elif assignment := ASSIGNMENT.match(line):
             _note(table + _keys(assignment[1]), len(table), number, lines)
-        found = QUOTES.findall(line)
-        quote = found[0] if len(found) % 2 else ""
     return lines
+
+
+def _left_open(line: str, quote: str) -> str:
+    """The mark of the text that goes on behind a line, or "", if one with the mark `quote` went on before it."""
+    at = 0
+    while True:
+        if quote:
+            end = line.find(quote, at)
+            if end < 0:
+                return quote
+            at = end + len(quote)
+        mark = next((each for each in QUOTED.finditer(line, at) if each[0] in LONG_TEXTS), None)
+        if mark is None:
+            return ""
+        quote, at = mark[0], mark.end()
 
 
 def _note(path: Path, known: int, number: int, lines: dict[Path, int]) -> None:

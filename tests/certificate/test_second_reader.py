@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from certificate.planting import GIVEN, cases
+from ncfix.certificate.certificate import Subject
 from ncfix.certificate.expected import Expected
 from ncfix.certificate.following import Given
 from ncfix.certificate.proof import prove
@@ -87,3 +88,28 @@ def test_a_long_turn_of_a_table_in_a_short_motion_is_proved() -> None:
     assert (proof.faults, proof.unproved) == ([], 0)
     lines = done.text.splitlines(keepends=True)
     assert prove(text, b"".join(lines[:8] + lines[9:]), mill, Given(assume_zero=True), "linuxcnc").faults
+
+
+def test_a_corrected_program_without_its_stamp_is_a_fault(root: Path) -> None:
+    """It would be corrected once more: numbers of axes are as good as any other change."""
+    mill, text = (
+        load(root / "examples" / "guide" / "mill.toml"),
+        b"G21 G90 G94\nG0 X0 Y0 Z50 A0 C0\nG1 X100 Y20 Z5 F500\nM2\n",
+    )
+    done = fix_program(read(text, "p", "linuxcnc"), mill, Setup(assume_zero=True), FixOptions())
+    bare = b"".join(line for line in done.text.splitlines(keepends=True) if b"NCFIX" not in line.upper())
+    given = Given(assume_zero=True)
+    assert bare != text
+    assert not prove(text, done.text, mill, given, "linuxcnc").faults
+    assert [fault.text for fault in prove(text, bare, mill, given, "linuxcnc").faults] == [
+        "the program has changed and carries no stamp"
+    ]
+
+
+def test_a_dialect_of_a_plugin_is_read_as_the_one_that_it_varies(root: Path) -> None:
+    mill, given = load(root / "examples" / "guide" / "mill.toml"), Given(assume_zero=True)
+    text = b"G71 G90 G94 G0 X0 Y0 Z50 A0 C0\nG1 X=100 Y=20 Z5 F500\nM30\n"
+    done = fix_program(read(text, "p", "siemens"), mill, Setup(assume_zero=True), FixOptions())
+    files = (("p", text), ("q", done.text), ("m", b""))
+    verdicts = [Subject(*files, mill, given, "brand", of, 1.0).certificate()["verdict"] for of in ("siemens", "fanuc")]
+    assert verdicts == ["proved", "proved in part"]

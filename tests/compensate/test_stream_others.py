@@ -224,6 +224,18 @@ def test_motions_that_are_refused_for_their_text_where_parts_meet(body: str, mac
     assert compared(source, machine, "fanuc", 60, jobs=2, expected=expected) == ""
 
 
+def test_a_part_that_is_planned_again_begins_with_what_was_refused_at_first(machine: Machine) -> None:
+    """The plan that is made before a part before it is done stays what it is, however often the part is written."""
+    machine = machine.replace(effects=tuple(Effect(f"E{axis}{axis}", (0.005,), Backlash()) for axis in "XYZ"))
+    cut = [f"G1 X{150 + k % 5}. Y{150 + k % 7}. Z{5 + k % 3}.5" for k in range(8)]
+    timed = ["G93", *["G1 X150. Z50.", "G1 X151. Z49."] * 3, "G94", "G1 X155. F500.", "G1 Z80."]
+    lines = [*F_HEAD, *cut, "G49", "G0 X150. Y150. Z50. B0. C0.", "G1 Y151.", *timed, *F_ODDS[5]]
+    source = "\n".join([*lines, *["G1 X150. Y150."] * 5, "G49", "M30", "%", ""]).encode()
+    expected = whole(source, machine, "fanuc", CALCULATOR)
+    for size in (150, 500, 700):
+        assert compared(source, machine, "fanuc", size, setup=CALCULATOR, expected=expected) == ""
+
+
 def test_tools_without_a_length_are_named_in_the_order_of_the_program(machine: Machine) -> None:
     """In the stamp and in what is said; the second has the lower number."""
     cut = [f"G1 X{150 + k % 5}. Y{150 + k % 7}. Z{5 + k % 3}.5" for k in range(20)]

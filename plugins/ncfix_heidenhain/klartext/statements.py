@@ -321,11 +321,6 @@ def statement(control: KlartextControl, flow: KlartextFlow, text: str) -> None:
 # -- other programs ---------------------------------------------------------------------------------------------------
 
 
-def call_program(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
-    """CALL PGM."""
-    flow.call_program(match["name"].strip())
-
-
 def select_program(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """SEL PGM: the program that CALL SELECTED PGM calls; one whose name is in a parameter is known only at run time."""
     name = match["name"].strip()

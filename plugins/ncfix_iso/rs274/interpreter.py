@@ -333,9 +333,11 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         polar = bool(block.values.keys() & POLAR)
         if polar:
             self.control.suspend(POLAR_WORDS, POLAR_WORDS, followed=True)
-        yield
-        if polar:
-            self.control.resume(POLAR_WORDS)
+        try:
+            yield
+        finally:
+            if polar:
+                self.control.resume(POLAR_WORDS)
 
     def calls_behind(self, block: Block, codes: Codes) -> bool:
         """Whether something is called behind the motion of the block, or P of M99 says where to go on."""

@@ -28,7 +28,11 @@ FOUND = ("verdict", "blocks", "motions", "proved", "proved_motions")
 
 @frozen
 class Subject:
-    """What a certificate is about: names and contents of the files, and what the program cannot know."""
+    """What a certificate is about: names and contents of the files, and what the program cannot know.
+
+    dialect  of the program, by its name
+    family   the dialect of which that is a variant, or that dialect
+    """
 
     original: tuple[str, bytes]
     corrected: tuple[str, bytes]
@@ -36,11 +40,12 @@ class Subject:
     machine: Machine
     given: Given
     dialect: str
+    family: str
     tolerance_um: float
 
     def certificate(self) -> dict[str, Any]:
         """Prove it, and say so."""
-        proof = prove(self.original[1], self.corrected[1], self.machine, self.given, self.dialect, self.tolerance_um)
+        proof = prove(self.original[1], self.corrected[1], self.machine, self.given, self.family, self.tolerance_um)
         stamp = proof.stamp
         return {
             "schema": SCHEMA,

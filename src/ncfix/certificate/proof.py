@@ -48,7 +48,7 @@ def prove(
 ) -> BlockProof:
     """Compare a program with its correction for a machine.
 
-    dialect       its name, by which the family of the language is known; empty: found out
+    dialect       by whose name the family of the language is known; empty: found out
     tolerance_um  of the way; the stamp of the corrected program wins
     """
     collects = gc.isenabled()
@@ -178,7 +178,7 @@ class Prover(Deviations):
         stamp = self.second.stamp
         if stamp is not None and stamp.machine != self.machine_hash:
             self.proof.fault("the stamp names another machine, or this one before it was changed", stamp.line, 0)
-        if stamp is None and [line.rest for line in self.first.lines] != [line.rest for line in self.second.lines]:
+        if stamp is None and not self.first.says(self.second):
             self.proof.fault("the program has changed and carries no stamp", 1, 0)
 
     def _text(self, pairing: Pairing, pair: LinePair) -> None:

@@ -67,6 +67,10 @@ class Text:
         read = Lines(family, text, numbers)
         return cls(family, text, numbers, read, stamp, read)
 
+    def says(self, other: Text) -> bool:
+        """Whether both say the same, line by line."""
+        return len(self.lines) == len(other.lines) and all(map(TextLine.says, self.lines, other.lines))
+
     def apart(self) -> Iterator[tuple[int, TextLine]]:
         """The lines that are not plain, and their indices."""
         lines = self.read

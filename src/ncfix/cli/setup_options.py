@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ncfix.arguments import OFFSET_AXES
 from ncfix.cli.console import tell
 from ncfix.cli.options import PATH
 from ncfix.diagnostics import Message, Place
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from ncfix.control.setup import Setup
     from ncfix.machine import Machine
 
-OFFSET_AXES = "XYZABCUVW"
-"""The order of the numbers of a work offset."""
 AXIS = re.compile(r"[XYZABCUVW]")
 BOTH = "both"
 """All positions of block delete."""

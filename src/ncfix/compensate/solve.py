@@ -150,7 +150,7 @@ class WrittenPlan:
     plan: Plan
     emission: Emission
     unchanged: Mask
-    reasons: dict[int, Reason]
+    reasons: Mapping[int, Reason]
     reaches_back: bool
     rounds: tuple[Round, ...] = ()
 
@@ -211,7 +211,7 @@ class AcceptedPlan:
     planning: Planning
     plan: Plan
     unchanged: Mask
-    reasons: dict[int, Reason]
+    reasons: Mapping[int, Reason]
     reaches_back: bool
     history: tuple[tuple[bool, Array], ...]
 
@@ -220,10 +220,16 @@ class AcceptedPlan:
         unchanged, shift = zip(*self.history, strict=True)
         return Round(np.array(unchanged), np.array(shift), position.copy())
 
-    def anew(self, before: PrecedingMotion | None, number: int) -> AcceptedPlan:
-        """Plan anew, in a round with this number, with what stays unchanged and whatever has got a reason since."""
+    def anew(self, conflicts: Mapping[int, str], before: PrecedingMotion | None, number: int) -> AcceptedPlan:
+        """Plan anew, in a round with this number: what stays unchanged here does, and blocks whose text is in conflict.
+
+        conflicts  block -> why it cannot be written
+        """
+        if conflicts and conflicts.keys() <= self.reasons.keys():
+            raise AssertionError(f"blocks {sorted(conflicts)} are unchanged and yet in conflict")
         head = None if before is None else before.in_round(number)
-        return self.planning.settled(self.unchanged, self.reasons, head)
+        new = {block: Reason(CODE_OF_TEXT, why) for block, why in conflicts.items() if block not in self.reasons}
+        return self.planning.settled(self.unchanged, {**self.reasons, **new}, head)
 
 
 @frozen
@@ -275,13 +281,14 @@ class Planning:
         unchanged = np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL))
         return self.settled(unchanged, {**refused, **_by_rule(moves)}, head)
 
-    def settled(self, unchanged: Mask, reasons: dict[int, Reason], head: Round | None) -> AcceptedPlan:
+    def settled(self, unchanged: Mask, reasons: Mapping[int, Reason], head: Round | None) -> AcceptedPlan:
         """Plan until nothing speaks against it, where these motions (n,) and blocks stay unchanged from the beginning.
 
         `head` is what the first motion was, where it is the last one of the part before. Motions, and the `reasons` of
         blocks, that have to stay besides are added.
         """
         moves, history, bound = self.intent.moves, list[tuple[bool, Array]](), np.zeros(len(unchanged), dtype=bool)
+        unchanged, reasons = unchanged.copy(), dict(reasons)
         while True:
             shift = None
             if head is not None:
@@ -359,11 +366,7 @@ def plan_and_write(
                 accepted.reaches_back,
                 tuple(rounds),
             )
-        if emission.conflicts and emission.conflicts.keys() <= accepted.reasons.keys():
-            raise AssertionError(f"blocks {sorted(emission.conflicts)} are unchanged and yet in conflict")
-        for block, why in emission.conflicts.items():
-            _explain(accepted.reasons, [block], CODE_OF_TEXT, why)
-        accepted = accepted.anew(before, len(rounds))
+        accepted = accepted.anew(emission.conflicts, before, len(rounds))
 
 
 def _with_what_they_need(moves: Moves, unchanged: Mask, bound: Mask, reasons: dict[int, Reason]) -> tuple[Mask, bool]:

@@ -408,8 +408,10 @@ class ProgramControl(ControlState):
     def in_one_piece(self) -> Iterator[None]:
         """The motions that are made meanwhile must not be split."""
         whole, self.whole = self.whole, True
-        yield
-        self.whole = whole
+        try:
+            yield
+        finally:
+            self.whole = whole
 
     def _style_of(self, motion: Motion) -> int:
         """The style of a motion; one that leads off a contour stays whole, and one in which the tool would stray."""

@@ -60,8 +60,17 @@ class Proving:
 
         before, after, machine_file = ((shown(path), read(path)) for path in (original, fixed, self.machine_path))
         known = dialect_of(before[1], before[0], self.dialect, self.machine)
-        given = given_of(self.setup, known)
-        return Subject(before, after, machine_file, self.machine, given, known.name, self.tolerance_um).certificate()
+        subject = Subject(
+            before,
+            after,
+            machine_file,
+            self.machine,
+            given_of(self.setup, known),
+            known.name,
+            known.variant_of or known.name,
+            self.tolerance_um,
+        )
+        return subject.certificate()
 
 
 def verify_certificate(
