@@ -153,3 +153,28 @@ def test_the_floors_and_modules_of_the_documents_are_there(root: Path) -> None:
     there |= {f"/{path.name}" for path in root.glob("*.py")}
     assert len(named) > 20
     assert not [found for found in named if not any(path.endswith(f"/{found[1]}") for path in there)]
+
+
+ROW = re.compile(r"(\w+(?:, \w+)*) {2,}\S")
+"""A row of a docstring: names, and what they are."""
+
+
+def test_the_rows_of_docstrings_are_fields_and_arguments(root: Path) -> None:
+    for path in [*root.glob("src/**/*.py"), *root.glob("plugins/**/*.py")]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.ClassDef | ast.FunctionDef):
+                continue
+            rows = map(ROW.match, (ast.get_docstring(node) or "").splitlines()[1:])
+            told = {name for row in rows if row for name in row[1].split(", ")}
+            assert told <= names_in(node), f"{path}: {node.name}: {sorted(told - names_in(node))}"
+
+
+def names_in(node: ast.ClassDef | ast.FunctionDef) -> set[str]:
+    """The arguments of a function; the fields, methods and other attributes of a class, and their arguments."""
+    found = {each.arg for each in ast.walk(node) if isinstance(each, ast.arg)}
+    if isinstance(node, ast.ClassDef):
+        found |= {each.name for each in node.body if isinstance(each, ast.FunctionDef)}
+        targets = [each.target for each in node.body if isinstance(each, ast.AnnAssign)]
+        found |= {each.id for each in targets if isinstance(each, ast.Name)}
+        found |= {each.attr for each in ast.walk(node) if isinstance(each, ast.Attribute)}
+    return found

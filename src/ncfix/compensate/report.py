@@ -61,8 +61,8 @@ class Refusal:
 class FixReport:
     """What was done to one program, as figures.
 
-    error_before, error_after  tip error along the path: {"max", "rms"} in um, and "where" (line) after
-            None where nothing was looked at
+    error_before_um, error_after_um  tip error along the path: "max" and "rms" in um, and "where" (line) after; None
+            where nothing was looked at
     max_correction_um  None where nothing was corrected
     rounding_um  what the control's digits may add to the path that was planned
     left    axes that had to stay where they stand, since the program has not said where that is

@@ -77,7 +77,7 @@ USUAL_SHARE = SHARES[2]
 class Background:
     """The coordinates and the likelihoods in them.
 
-    view      the data
+    data      what was measured
     relative  (m,) standard deviation of each value against that of a plain one, outliers very large
     rotation  (m, n) to the n coordinates; its columns are in units of the noise
     spectrum  (n,) variance of everything at a size of one noise, along the coordinates

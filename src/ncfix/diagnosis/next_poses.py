@@ -66,7 +66,7 @@ class Proposal:
     before   how well the worst rival can be told from the true name, squared noise units; after with the new poses
     chance   how often one name stands alone afterwards, 20 to 1 likelier than the others, each as likely to be true
     reason   why the data so far do not tell them apart
-    rivals   the names that are told apart; where there is no plan, those that cannot be
+    alternatives  the names that are told apart; where there is no plan, those that cannot be
     alike    names that cannot be told from it by any of the poses, besides
     stuck    names beside which another would stay, were they true, however often this is measured
     beyond   axes that have to go beyond the travels measured so far

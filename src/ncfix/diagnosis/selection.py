@@ -135,9 +135,9 @@ class Selected:
 
     members   name -> form and size
     odds      name -> log odds that it is there, the others given; what it was chosen from is counted
-    runners   name -> {other name: log odds of that one in its place}
-    rivals    the names of what has none
-    twins     name -> those of its runners that act in the same way in these data
+    runners_up  name -> {other name: log odds of that one in its place}
+    alternatives  the keys of members that have no name
+    acting_alike  name -> those of its runners-up that act in the same way in these data
     """
 
     members: dict[str, Member]

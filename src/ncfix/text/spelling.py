@@ -163,7 +163,7 @@ def rules() -> NumberRules:
 
 @frozen
 class Styles:
-    """The manner of m numbers, as in `spelling.NumberStyle`; `clear` (m,): nothing but a sign, digits and a point."""
+    """The manner of m numbers, as in `NumberStyle`; `clear` (m,): nothing but a sign, digits and a point."""
 
     decimals: IntArray
     point: Mask

@@ -9,7 +9,7 @@ breadth beside it, is not taken for the one that is meant.
              --> what the machine makes of it  |    back:  from what is meant to what the other makes
     other    --> what the machine makes of it -+    before: from what the original makes to what it means
 
-Of every path as much is kept as a nearest point may lie on. If that is not enough, `nearest.LostError` is raised, and
+Of every path as much is kept as a nearest point may lie on. If that is not enough, `NearestNotHereError` is raised, and
 both programs have to be at hand as a whole.
 """
 
@@ -57,7 +57,7 @@ class CutPath:
     left      linear axis -> lines of motions that cannot be corrected along it
     last      nothing comes after it
     rounding  how far the tip may be off because numbers are rounded to the control's digits, mm
-    sides     (n, n_axes) of the play on which axes are after each motion, those that do not count, too, if there is any
+    bodies    where the bodies of axes with play are meanwhile, if there is any
     """
 
     actual: Curve

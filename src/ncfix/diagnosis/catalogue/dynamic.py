@@ -34,11 +34,11 @@ FADING_S = {"spike": 0.1, "settling": 0.4}
 def with_motion(measurement: Measurement, machine: Machine) -> Measurement:
     """The measurement with columns of how the linear axes X Y Z moved, if its rows are circles run at a feed.
 
-    speed_x_y  mm/s of X, the way its number grows, on circles in XY; zero on others
-    accel_x_y  mm/s^2
-    slave_x_y  speed_x_y where Y is faster, else zero
-    spike_x, settling_x   the direction in which it moves, faded since it turned round
-    dir_X      that direction, where the file does not say it
+    - speed_x_y: mm/s of X, the way its number grows, on circles in XY; zero on others;
+    - accel_x_y: mm/s^2;
+    - slave_x_y: speed_x_y where Y is faster, else zero;
+    - spike_x, settling_x: the direction in which it moves, faded since it turned round;
+    - dir_X: that direction, where the file does not say it.
     """
     if measurement.kind != "length" or not {*CENTRE, "feed_mm_min"} <= set(measurement.columns):
         return measurement
