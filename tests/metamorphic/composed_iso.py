@@ -119,7 +119,7 @@ class IsoAuthor(Author):
         turns = (target[3:] != self.q[3:]).any() or self.unsaid & set(self.letters[3:])
         if self.pointing and turns and self.pointed(target) is None:
             self.tip(self.style)
-        if not extra:
+        if code in ("0", "1"):
             self.way = float(np.linalg.norm((target - self.q)[:3]))
         steps = self.steps and bool(self.unsaid)
         if steps:

@@ -58,7 +58,7 @@ class SiemensAuthor(IsoAuthor):
         here, there = self.place(self.q), self.place(target)
         words, owed = [], self.unsaid | self.anew
         polar = extra is None and not self.steps and not self.diameter and not self.exact and self.often(0.1)
-        if extra is None:
+        if code in ("0", "1"):
             self.way = float(np.linalg.norm((target - self.q)[:3]))
         values = self.values(target)
         self.anew = self.anew - set(values)

@@ -73,6 +73,8 @@ SPELLING = Spelling(vector=tuple(f"{address}=" for address in VECTOR), vector_di
 BARE = Spelling(point=False)
 OTHER_DECIMALS = 5
 """Of words that are no axes."""
+ARGUMENT_DECIMALS = 9
+"""Of arguments that stay: a computed depth, written again, is the same one."""
 
 CIP = MOTIONS["cip"]
 ARCS = frozenset({20, 30})
@@ -328,7 +330,7 @@ def argument(value: float | str | None) -> str:
     """An argument as it is written."""
     if value is None:
         return ""
-    return f'"{value}"' if isinstance(value, str) else BARE.short(value, OTHER_DECIMALS)
+    return f'"{value}"' if isinstance(value, str) else BARE.short(value, ARGUMENT_DECIMALS)
 
 
 def number_of(call: CycleCall, place: int) -> float:

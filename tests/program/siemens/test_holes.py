@@ -61,6 +61,12 @@ def test_arguments_that_were_computed_are_numbers() -> None:
     ]
 
 
+@pytest.mark.parametrize(("depth", "value"), [("-20/3", -20 / 3), ("-6.427817", -6.427817)])
+def test_the_call_behind_the_holes_has_the_depth_of_the_program(depth: str, value: float) -> None:
+    back = written(f"MCALL CYCLE81(50,0,2,{depth})\nX5\nMCALL").splitlines()[-2]
+    assert float(back.split(",")[-1].strip(")")) == pytest.approx(value, abs=1e-9)
+
+
 def test_an_argument_that_nobody_knows_stays_and_so_does_the_depth() -> None:
     body = "MCALL CYCLE83(50,0,2,-20,,-5,,R9)\nX5\nMCALL"
     assert written(body) == body.replace("X5", "X4.988")
