@@ -322,7 +322,7 @@ class KlartextAuthor(Author):
         if self.plane or self.tcp:
             return
         off = (self.scale.turn - np.eye(3)).any()
-        factor = 1.0 if off else chance.choice([0.5, 2.0])
+        factor = 1.0 if off else 0.5 if self.exact else chance.choice([0.5, 2.0])
         self.put("CYCL DEF 11.0 SCALING")
         self.put(f"CYCL DEF 11.1 SCL {factor}")
         self.scale = scaled(factor, factor, factor)

@@ -233,7 +233,7 @@ class SiemensAuthor(IsoAuthor):
                 n = chance.randrange(2)
                 words, new = ["XY"[n] + "0"], scaled(*[-1.0 if k == n else 1.0 for k in range(3)])
             else:
-                factor = chance.choice([0.5, 2.0])
+                factor = 0.5 if self.exact else chance.choice([0.5, 2.0])
                 words, new = [f"{letter}{factor}" for letter in "XYZ"], scaled(factor, factor, factor)
             self.alone(("A" if more else "") + kind + " " + " ".join(words))
             self.frame = self.frame @ new if more else new

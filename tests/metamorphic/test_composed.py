@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,21 @@ G1 AP=0 RP=10.123456 F500
 G1 X0 Y0 Z0
 M30
 """,
+    "a direction of the tool in a flat program": """%
+O1
+G21 G90 G94 G54
+G0 X0 Y0 Z230. A20. C0
+G43.5 H1
+G1 X1. Y18. Z55. I0. J-0.5 K0.8 F500.
+G49
+G1 X0. Y0. Z230. A0. C0.
+M98 P7001 L2
+M30
+O7001
+G91 G1 X5. Y3. Z-1.
+M99
+%
+""",
     "arc to a computed increment": """BEGIN PGM R MM
 TOOL CALL 1 Z
 L X-24.680000 Y-24.733 Z12.981 A+0.000000 C+0.000000 FMAX
@@ -81,6 +97,6 @@ END PGM R MM
 @pytest.mark.parametrize("name", FOUND)
 def test_what_compositions_have_found(name: str, root: Path) -> None:
     machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
-    dialect = "heidenhain" if FOUND[name].startswith("BEGIN") else "siemens"
-    made = Composition(AUTHORS[dialect], dialect, machine, COMPOSED, OPTIONS, ())
+    dialect = {"B": "heidenhain", "G": "siemens", "%": "fanuc"}[FOUND[name][0]]
+    made = Composition(AUTHORS[dialect], dialect, machine, COMPOSED, replace(OPTIONS, flatten=True), ())
     assert not corrected(FOUND[name], made).refused

@@ -200,7 +200,7 @@ class RS274Flattener(Flattener):
     def absent(self) -> list[Change]:
         """Words that a block means and does not have: the other coordinate of a polar one."""
         values = self.values.values
-        letters = [letter for letter in values if letter not in self.plan.letters and letter in INDEX]
+        letters = [letter for letter in values if letter not in self.plan.letters and letter in "XYZ"]
         stop = self.end_of_words()
         return [Change(stop, stop, " " + letter + self.number(letter, values[letter])) for letter in letters]
 
