@@ -11,7 +11,8 @@ import numpy as np
 from ncfix.certificate.following import INCH, NO_POLE, AxisFollower
 from ncfix.certificate.holes import HoleCall, assign
 from ncfix.certificate.reading import AXES, RETRACTS, TextLine, TextWord
-from ncfix.certificate.steps import NAN, AxisStep, Kind
+from ncfix.certificate.steps import NAN, AxisStep, Kind, ProgramSteps
+from ncfix.certificate.text import Text
 from ncfix.certificate.turning import PlaneBlock, about
 
 HOLES = re.compile(r"CYCL DEF (20[0-35-79]|24[01])\b")
@@ -31,6 +32,10 @@ OVERSIZE = re.compile(r"\bDL ?(?:([+-]?[\d.,]+)|[+-]?Q)")
 """What TOOL CALL adds to the length of the tool."""
 
 
+GOES_ON = re.compile(rb"~[ \t]*\n(?![ \t]*Q)", re.IGNORECASE)
+"""A block that goes on in a line which is no parameter of a cycle."""
+
+
 class KlartextFollower(AxisFollower):
     """Follows Klartext.
 
@@ -42,6 +47,12 @@ class KlartextFollower(AxisFollower):
     datum = False
     drilling = 0
     oversize = 0.0
+
+    def run(self, text: Text) -> ProgramSteps:
+        """Follow the lines of a program."""
+        if GOES_ON.search(text.source):
+            self.lost["odd"] = "a block goes on in the next line (~)"
+        return super().run(text)
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """What one line does; None if it moves nothing."""
