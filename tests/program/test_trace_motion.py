@@ -21,6 +21,12 @@ def test_increments_add_up() -> None:
     assert moves.incremental.tolist() == [False, True, True, False]
 
 
+@pytest.mark.parametrize(("code", "unit"), [("G70", 25.4), ("G71", 1.0), ("G70 G90", 25.4), ("G71 G17 F100", 1.0)])
+def test_iso_units_may_be_those_of_din_66025(code: str, unit: float) -> None:
+    assert follow(f"G20\n{code}\nG1 X2 F10\n{code} X1", dialect="iso").moves.end[:, 0].tolist() == [2 * unit, unit]
+    assert "turning cycle" in reasons(follow(f"{code.split()[0]} X1 P10 Q20", dialect="linuxcnc"))[0]
+
+
 def test_inches_are_millimetres_and_degrees_radians() -> None:
     moves = follow("G20\nG1 X1 B90 F10", axes="XYZB").moves
     assert moves.end[0].tolist() == [25.4, 0.0, 0.0, math.pi / 2]

@@ -59,6 +59,8 @@ PROBES = (382, 383, 384, 385)
 SPLINES = (50, 51, 52)
 THREADS = (330, 331, 760)
 TURNING_CYCLES = (700, 710, 711, 712, 720, 721, 722)
+DIN_UNITS = {700: 200, 710: 210}
+"""G70 and G71 of DIN 66025, and the codes that mean the same."""
 
 
 def grouped(**codes: tuple[int, ...]) -> dict[int, str]:
@@ -173,6 +175,7 @@ class Rules:
     takes       G codes that take the axis words of their block for themselves, besides those of `plans`
     radius_first  where an arc has R and a centre, R counts; elsewhere that is an error
     length_by_h_alone  H without G43 in its block may be another length, or none, as the control has it
+    din_units   G70 and G71 by themselves are inches and millimetres, as in DIN 66025
     adds_rotations  in G91 the angle of G68 is added to that in force
     scales_named  scaling (G51) acts on the axes only that its block names
     offset_group  the group of the work offsets' codes: 14 where #4014 tells which is in force
@@ -194,6 +197,7 @@ class Rules:
     takes: frozenset[int] = frozenset()
     radius_first: bool = False
     length_by_h_alone: bool = False
+    din_units: bool = False
     adds_rotations: bool = False
     scales_named: bool = False
     offset_group: int = 14
@@ -206,7 +210,7 @@ class Rules:
 
 
 LINUXCNC = Rules(True, LINUXCNC_G, frozenset(), repeats="L")
-ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40, 921}), length_by_h_alone=True)
+ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40, 921}), length_by_h_alone=True, din_units=True)
 RULES = {"iso": ISO, "linuxcnc": LINUXCNC}
 """By `Dialect.semantics`."""
 

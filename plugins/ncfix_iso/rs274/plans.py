@@ -50,6 +50,9 @@ and of working areas, G28.1 and G30.1 that keep the place and that go to one."""
 SMOOTHING = 51
 """G5.1 Q: axis words, `G5.1 Q2 X0 Y0 Z0`, say for which axes it is, and move nothing."""
 
+CYCLE_WORDS = frozenset("DIJKLPQRUW")
+"""Words without which G70 and G71 are no cycles: of turning, and holes on a circle."""
+
 LANE_LETTERS = frozenset("FN") | INDEX.keys()
 ARC_LETTERS = frozenset("IJKR")
 PLACES = ARC_LETTERS | INDEX.keys()
@@ -284,6 +287,8 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
             like = rules.aliases[word.address, code].code
             code = tenths(like)
         if word.address == "G":
+            if rules.din_units and letters.isdisjoint(CYCLE_WORDS):
+                code = groups.DIN_UNITS.get(code, code)
             named |= code == SMOOTHING and "Q" in letters
             own = rules.strict or ("G", code) in rules.operations
             if code in WITHOUT_WORDS and not own and not letters.isdisjoint(INDEX):
