@@ -193,6 +193,23 @@ def test_reading_a_position_is_said() -> None:
     assert reasons(found) == ["", ""]
 
 
+@pytest.mark.parametrize("setting", ["#2=4.", "#[#3]=4.", "#2=4. #3=5"])
+def test_what_is_set_on_a_condition_of_the_machine_is_known_only_at_run_time(setting: str) -> None:
+    found = follow(f"#2=3.\n#3=2\nIF[#1000EQ1]THEN{setting}\nG0Y1.\nX#2", dialect="fanuc")
+    assert reasons(found) == ["", "where the axis X stands is known only at run time"]
+
+
+@pytest.mark.parametrize("setting", ["#3000=1(TOO HIGH)", "#1100=1"])
+def test_alarms_and_signals_on_a_condition_of_the_machine_do_no_harm(setting: str) -> None:
+    assert reasons(follow(f"#2=3.\nIF[#1000EQ1]THEN{setting}\nG0X#2", dialect="fanuc")) == [""]
+
+
+@pytest.mark.parametrize("then", ["#5221=4.", "G0X3.", "#[#2000]=1"])
+def test_what_else_is_done_on_a_condition_of_the_machine_leaves_nothing_certain(then: str) -> None:
+    found = follow(f"IF[#1000EQ1]THEN{then}\nG0Y1.", dialect="fanuc", no_point="calculator")
+    assert reasons(found)[-1] == "which blocks are executed here is decided at run time"
+
+
 def test_a_skipped_condition_sets_nothing() -> None:
     text = "IF[1EQ1]THEN#1=1.\n/IF[1EQ1]THEN#1=2.\nG0X#1"
     assert last(follow(text, dialect="fanuc", no_point="calculator", block_skip=True)) == [1, 0, 0]

@@ -26,7 +26,7 @@ from ncfix_iso.rs274.control import Block
 from ncfix_iso.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, RS274Interpreter, calls_of
 from ncfix_iso.rs274.order import MACHINE
 from ncfix_iso.rs274.parameters import Store, whole
-from ncfix_iso.rs274.plans import Codes, RS274Plan, plan_of
+from ncfix_iso.rs274.plans import Codes, FlowLine, RS274Plan, RS274Unit, plan_of
 from ncfix_iso.rs274.settings import units
 
 G20, G21, G90, G91 = 200, 210, 900, 910
@@ -108,6 +108,28 @@ class MacroInterpreter(RS274Interpreter):
         return super().lane_is_open(plan) and not (special or self.modal_calls or self.cornered)
 
     # -- one block ----------------------------------------------------------------------------------------------------
+
+    def execute(self, plan: RS274Plan, unit: RS274Unit, block: int) -> bool:
+        """Execute a block; True if the program ends there. A flat program has no conditions left to say it with."""
+        flow = plan.flow
+        if flow is not None and flow.keyword == "if then" and not self.watcher and self.may_be_set(plan, flow):
+            return False
+        return super().execute(plan, unit, block)
+
+    def may_be_set(self, plan: RS274Plan, flow: FlowLine) -> bool:
+        """Whether variables are set, and nothing else is done, on a condition that is known at run time only: then they
+        are, too. Alarms and messages that depend on it do no harm: where the program goes on, none was raised."""
+        alone = plan.assignments and not (plan.letters or plan.template.g_codes or plan.template.m_codes)
+        if not alone or not isinstance(flow.arguments[0](self.control), Unknown):
+            return False
+        named = [target(self.control) if callable(target) else float(target) for target, _, _ in plan.assignments]
+        numbers = [variable_number(nominal(each)) for each in named if not isinstance(each, Unknown)]
+        if len(numbers) < len(named) or not all(map(system.is_harmless, numbers)):
+            return False
+        for number in numbers:
+            self.control.parameters.check_writable(number)
+            self.control.parameters.assign(number, Unknown())
+        return True
 
     def beside_statement(self, plan: RS274Plan, index: int) -> bool:
         """Execute the words that stand beside a statement: behind THEN, or the number of a program."""

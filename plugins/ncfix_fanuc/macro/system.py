@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from ncfix.control.expressions import Fault, Unknown, Value, nominal, scaled
 from ncfix_fanuc.macro.data import keep_length
+from ncfix_fanuc.macro.variables import is_system
 from ncfix_iso.rs274.systems import activate, before_persistent
 
 if TYPE_CHECKING:
@@ -84,6 +85,11 @@ def modes(control: MacroControl) -> dict[int, Getter]:
     return {base + number: getter for base in (4000, 4200, 4300) for number, getter in state.items()}
 
 
+def is_harmless(number: int) -> bool:
+    """Whether it moves nothing and changes no coordinates when a variable is set."""
+    return not is_system(number) or any(number in each for each in HARMLESS)
+
+
 def was_set(control: MacroControl, number: int, value: Value) -> None:
     """The program has set a variable of the control."""
     if number == ALARM:
@@ -95,5 +101,5 @@ def was_set(control: MacroControl, number: int, value: Value) -> None:
             activate(control, control.modal.system)
     elif number in LENGTHS:
         keep_length(control, number - LENGTHS.start + 1, scaled(control.modal.unit, value))
-    elif not any(number in each for each in HARMLESS):
+    elif not is_harmless(number):
         control.refuse_rest(f"the program sets #{number}, which ncfix does not follow")
