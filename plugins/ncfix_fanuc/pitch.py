@@ -157,7 +157,7 @@ class FanucPitch(FileControl):
         return is_increments(content) or is_records(content)
 
     def look(self, files: Files) -> tuple[Message, ...]:
-        """The same; without what ncfix writes of sign and units, every file by itself."""
+        """See `Control`; without what ncfix writes of sign and units, every file by itself."""
         if SETTINGS in files:
             return self.lint(files)
         found = []

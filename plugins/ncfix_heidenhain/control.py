@@ -159,7 +159,7 @@ class Heidenhain(FileControl):
         return TABLES.match(content) is not None
 
     def look(self, files: Files) -> tuple[Message, ...]:
-        """The same without the sign, and `.COM` files by themselves if there is no `.CMA`."""
+        """See `Control`; without the sign, and `.COM` files by themselves if there is no `.CMA`."""
         configs = [name for name in files if name.lower().endswith(".cma")]
         if SIGN in files:
             return self.lint(files)

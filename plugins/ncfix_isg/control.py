@@ -206,7 +206,7 @@ class Isg(FileControl):
         return SCREW_MARK in content or is_list(content) or is_grid(content)
 
     def look(self, files: Files) -> tuple[Message, ...]:
-        """The same; grids and lists of axes by themselves if no list of VOLCOMP names them."""
+        """See `Control`; grids and lists of axes by themselves if no list of VOLCOMP names them."""
         if any(is_list(content) for content in files.values()):
             return self.lint(files)
         grids = sorted(name for name, content in files.items() if is_grid(content))

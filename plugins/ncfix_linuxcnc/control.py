@@ -353,7 +353,7 @@ class LinuxCnc(Control):
         return is_ini(content) or is_table(name, content)
 
     def look(self, files: Files) -> tuple[Message, ...]:
-        """The same, and of tables that no ini file loads what is wrong in them under either type."""
+        """See `Control`; of tables that no ini file loads what is wrong in them under either type."""
         return messages_of(look_at(files))
 
 

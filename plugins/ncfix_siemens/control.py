@@ -118,7 +118,7 @@ class Siemens(FileControl):
         return TABLES.search(content) is not None
 
     def look(self, files: Files) -> tuple[Message, ...]:
-        """The same, but for sign, products and letters of axes, which only comments of ncfix say."""
+        """See `Control`; but for sign, products and letters of axes, which only comments of ncfix say."""
         folder = read_folder(files)
         return self.lint(files) if folder.said else messages_of(folder.remarks)
 

@@ -67,7 +67,7 @@ def check_name(way: str, path: str) -> None:
 
 
 def folded_name(path: str) -> str:
-    """The same for all names that some file system takes for one: case and composed letters make no difference."""
+    """A name without what some file systems do not tell apart: case, and composed letters."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", path).casefold())
 
 

@@ -365,7 +365,7 @@ def working(kind: str, name: str) -> Iterator[None]:
 
 
 def blamed(error: BaseException) -> PluginError | None:
-    """The same for an exception that came all the way up: a plugin's if code of a plugin's was at work."""
+    """The `PluginError` of an exception that came all the way up, if code of a plugin's was at work."""
     at_work = {_top(frame.f_globals.get("__name__", "")) for frame, _ in traceback.walk_tb(error.__traceback__)}
     try:
         plugins = load_plugins().loaded

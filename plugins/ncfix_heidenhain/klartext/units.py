@@ -116,7 +116,7 @@ def lane_of(plan: KlartextPlan, slots: Mapping[str, int] | None, axes: int) -> L
 
 
 def arc_of(plan: KlartextPlan, slots: Mapping[str, int]) -> Lane | None:
-    """The same of an arc; None if it is not in the plane of X and Y, or lacks what it needs."""
+    """The view of the fast lane of an arc; None if it is not in the plane of X and Y, or lacks what it needs."""
     own, named = ARCS[plan.name], slots.keys() & LETTERS
     senses = plan.flags & SENSES.keys()
     if len(senses) != 1 or not plan.flags <= senses | {"r0"} or not slots.keys() <= {"X", "Y", "Z", "F", "S", own}:

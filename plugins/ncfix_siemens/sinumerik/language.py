@@ -64,7 +64,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
 
 
 def arc_in_bulk(program: Program, block: int, layout: SinumerikLayout) -> ArcLayout | None:
-    """The same of the words of an arc."""
+    """Where the words of an arc stand, for arcs that are written many at a time."""
     fixed = fixed_centre(program.template_of(block))
     if layout.via or layout.angle is not None or layout.forms.keys() & set(CENTRE_LETTERS) - fixed.keys():
         return None

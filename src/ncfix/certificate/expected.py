@@ -270,7 +270,7 @@ class Expected:
         return found
 
     def control_halves(self, unit: float) -> Array:
-        """The same for the digits of the control."""
+        """How far off numbers of axes are at most, rounded to the digits of the control."""
         found = self._halves.get((unit,))
         if found is None:
             written = np.zeros((1, len(self.machine.axes)), dtype=np.intp)
@@ -285,7 +285,10 @@ class Expected:
         return np.maximum(0, np.ceil(-np.log10(least) - 1e-9)).astype(np.intp)
 
     def halves(self, units: Array, written: NDArray[np.intp]) -> Array:
-        """The same for blocks with so many digits behind the point (n, n_axes), in units of so many mm (n,)."""
+        """How far off numbers of axes are at most, with so many digits behind the point (n, n_axes).
+
+        units  mm, those of the blocks (n,)
+        """
         digits = np.maximum(self.control_digits(units), written)
         return 0.5 * 10.0 ** -digits.astype(float) * np.where(self.machine.rotary, math.pi / 180, units[:, None])
 

@@ -161,7 +161,7 @@ class Ways:
 
     @classmethod
     def of(cls, model: TipModel, steps: ProgramSteps, at: Indices) -> Ways:
-        """Those of steps (n,)."""
+        """The ways of steps (n,)."""
         turn = steps.turn[at]
         return cls(
             model.internal(steps.start[at]),

@@ -27,7 +27,7 @@ class Family(Enum):
 
     @classmethod
     def of(cls, text: bytes, dialect: str) -> Family:
-        """That of a dialect, by its name, or else what the beginning of a text shows."""
+        """The family of a dialect, by its name, or else what the beginning of a text shows."""
         head = text[:4096].upper()
         if dialect == "heidenhain" or re.search(rb"^\s*(?:\d+\s+)?BEGIN\s+PGM\b", head, re.MULTILINE):
             return cls.KLARTEXT

@@ -95,7 +95,7 @@ class Text:
         return np.array(pattern.findall(self.source), dtype=np.float64)
 
     def without_block_numbers(self) -> Text:
-        """The same program where nobody looks at block numbers, nor at those to which jumps go."""
+        """The program where nobody looks at block numbers, nor at those to which jumps go."""
         lines = [replace(line, block="", rest=ANY_BLOCK_NUMBER.sub("", line.rest)) for line in self.lines]
         return replace(self, lines=lines, read=None)
 

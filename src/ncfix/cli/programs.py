@@ -175,7 +175,7 @@ class Motions:
         return table, parts.follower.messages
 
     def whole(self) -> tuple[TableTexts, Sequence[Message]]:
-        """The same of a program as a whole."""
+        """The table and what there is to say, of a program as a whole."""
         path = self.source.path
         program = self.following.read(path, self.source.everything())
         found = self.following.trace(program, path)

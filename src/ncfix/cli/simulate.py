@@ -134,7 +134,7 @@ class Errors:
         return table, along, messages
 
     def whole(self) -> tuple[Iterable[bytes], SimulatedErrors, Sequence[Message]]:
-        """The same of a program as a whole."""
+        """The table, the figures and what else there is to say, of a program as a whole."""
         from ncfix.compensate.figures.simulation import tip_errors_of
 
         path = self.source.path

@@ -229,7 +229,7 @@ def said_of(left: Iterable[LeftAxis], path: str) -> list[Message]:
 
 
 def in_order(found: Mapping[str, LeftAxis]) -> dict[str, LeftAxis]:
-    """Those that are left in the earliest lines first."""
+    """The axes, those that are left in the earliest lines first."""
     return dict(sorted(found.items(), key=lambda item: (item[1].first, item[0])))
 
 

@@ -108,7 +108,7 @@ class ProvedPart:
     next_line: int
 
     def placed(self, file: int, at: int) -> ProvedPart:
-        """The same with the text put into a file, from a byte on."""
+        """Put the text into a file, from a byte on; the part without it."""
         assert isinstance(self.text, bytes)
         put_at(file, at, self.text)
         return replace(self, text=len(self.text))

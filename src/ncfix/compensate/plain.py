@@ -391,7 +391,10 @@ class Planner:
         return bool(motions.within_limits(meant, done, *axes, linear, NEARLY * JUMP, FUZZ))
 
     def _fine_inside(self, poses: MotionEnds, real: Segments, pieces: Pieces, inner: Index, done: Array) -> bool:
-        """The same of pieces that end inside of motions (k,); `done` (n + 1, n_axes) poses between these, corrected."""
+        """Whether pieces that end inside of motions (k,) come near no limit.
+
+        done  (n + 1, n_axes) corrected poses between the motions
+        """
         near = distinct(np.concatenate([inner, inner + 1]))
         own, ends, fraction = pieces.move[near], pieces.end[near], pieces.fraction[near]
         at_start = pieces.move[np.maximum(near - 1, 0)] != own

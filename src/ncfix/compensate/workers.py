@@ -161,7 +161,7 @@ class PartResult(Protocol):
     """What has been done to a part."""
 
     def placed(self, file: int, at: int) -> Any:
-        """The same with the text put into a file, from a byte on; instead of it there is how long it is."""
+        """Put the text into a file, from a byte on; the result with how long it is instead of it."""
 
 
 @frozen
@@ -344,7 +344,7 @@ class WorkerPool(Generic[Result]):
 def worker_pool(
     jobs: int, worker: Callable[[Read], Worker[Made]], files: OpenFiles | None
 ) -> Iterator[WorkerPool[Made]]:
-    """Those who work on a program: `jobs` processes, of which this is one.
+    """The processes that work on a program: `jobs` processes, of which this is one.
 
     worker  makes what corrects a text in another process
     files   all that processes share; without them, and where processes cannot be forked, this one works alone

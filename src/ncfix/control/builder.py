@@ -194,7 +194,7 @@ class MotionBuilder:
             self._resting[self.count] = axes
 
     def many_rest(self, axes: IntArray) -> None:
-        """The same of many motions that are added next, (n,)."""
+        """As `rests`, of many motions that are added next, (n,)."""
         rows = np.flatnonzero(axes)
         self._resting |= dict(zip((self.count + rows).tolist(), axes[rows].tolist(), strict=True))
 

@@ -388,7 +388,7 @@ class ProgramControl(ControlState):
     def resting_of_many(
         self, words: NDArray[np.int64], starts: NDArray[np.float64], ends: NDArray[np.float64]
     ) -> NDArray[np.int64]:
-        """The same of motions with `words` (n,) from `starts` to `ends` (n, 9), in coordinates that are not turned."""
+        """As `_resting`, of motions with `words` (n,) from `starts` to `ends` (n, 9), in coordinates not turned."""
         columns = list(self.modal.plane.pair)
         still = (np.abs(ends[:, columns] - starts[:, columns]) <= NO_WAY).all(axis=1)
         return np.where(still & (words & self.plane_axes != 0), self.plane_axes, 0)

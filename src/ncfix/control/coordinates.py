@@ -57,7 +57,7 @@ class Plane:
         return self.first, self.second
 
     def of(self, values: Sequence[T]) -> tuple[T, T]:
-        """Those of its two axes, among values of all axes."""
+        """The values of its two axes, of those of all axes."""
         return values[self.first], values[self.second]
 
 

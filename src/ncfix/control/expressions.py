@@ -47,7 +47,7 @@ class Fault(Exception):  # noqa: N818 - a fault of the program that is followed,
         self.span = span
 
     def at(self, span: Span | None) -> Fault:
-        """The same fault at a place in the block, if it has none yet."""
+        """This fault at a place in the block, if it has none yet."""
         if self.span is None:
             self.span = span
         return self

@@ -270,7 +270,7 @@ class Interpreter(ABC, Generic[U]):
         """Raise `NotInPartsError` where what is in a part depends on an earlier one in a way that is not kept."""
 
     def check_motions(self, program: Program, moves: Moves) -> None:
-        """The same, when the part has been followed."""
+        """As `check_part`, when the part has been followed."""
 
     # -- where we are -------------------------------------------------------------------------------------------------
 

@@ -156,7 +156,10 @@ class MachinePosture:
         return Postures(pointing, (self.machine[outer], self.machine[inner]), here, ways, at_pole)
 
     def only_posture(self, direction: Sequence[float], rules: WayRules) -> Postures | None:
-        """The same from wherever the axes may stand; None unless travels leave one way, to the whole turn."""
+        """The way to point the tool along a unit vector from wherever the axes may stand.
+
+        None unless travels leave one way, to the whole turn.
+        """
         if self.kinematics is None or self.pointing is None or not rules.in_travel:
             return None
         outer, inner = (self.kinematics.travel[column] for column in self.pointing.columns)

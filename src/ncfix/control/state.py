@@ -291,7 +291,7 @@ class ControlState(ABC):
         """For each letter what its numbers count from, besides shifts and turns that the program states in numbers."""
 
     def spatial_anchor(self, index: int) -> Hashable:
-        """The same for what X, Y and Z have of their own: whether they are those of the tip, and the tool's length."""
+        """What else the numbers of X, Y and Z count from: whether they are those of the tip, and the tool's length."""
         return self.tcp, self.tools.offset if (self.tcp and not self.tilted) or index == Z else None
 
     def program_position(self) -> Vector:
@@ -308,7 +308,7 @@ class ControlState(ABC):
         return self.in_frame([b - a for a, b in zip(self.position, target, strict=True)])
 
     def circle(self, plane: Plane, centre: Point, sweep: float) -> Arc:
-        """That of an arc in commands; NaN along axes of which it is not known where the arc starts.
+        """An arc in command coordinates; NaN along axes of which it is not known where it starts.
 
         centre  from the start of the arc, in a plane of the program's frame, mm
         sweep   rad, as the commands turn
@@ -448,7 +448,7 @@ class ControlState(ABC):
         return self.length_under_tcp_with(self.tools.vector, self.tools.offset)
 
     def length_under_tcp_with(self, tool: Vector, number: int | None) -> float:
-        """The same with an offset in force, and the number of its tool (None without one).
+        """The length of tool that X Y Z are of with an offset in force, and the number of its tool (None without one).
 
         Without one the control leads the spindle reference; if the setup says that X Y Z are those of the tip, the tip.
         """

@@ -149,7 +149,7 @@ def conditions(machine: Machine, effects: Sequence[Effect]) -> tuple[str, ...]:
 
 
 def _of_play(effect: Effect, basis: Backlash, rotary: set[str], alone: bool) -> Sequence[str]:
-    """Those whose export writes play: of an axis along or about itself in their places for that, else in tables."""
+    """The controls that hold play: of an axis along or about itself in their places for that, else in tables."""
     if effect.joint in rotary:
         turned = len({name for name in (effect.signal, effect.times, effect.joint) if name}) == 1
         return TURNED if turned and effect.name[1] == effect.joint and not effect.location else ("siemens",)

@@ -60,7 +60,7 @@ class Discrimination:
         return square - float(vector @ np.linalg.solve(self.matrix + own.T @ own, vector))
 
     def told_with(self, rows: Sequence[int]) -> Array:
-        """The same with these poses and one more, for every pose on offer, (n,): a block of rows added to a fit."""
+        """As `told`, with these poses and one more, for every pose on offer, (n,): a block of rows added to a fit."""
         products, missed = self._seen
         count, height = self.signal.shape
         taken = (height * np.asarray(rows, dtype=np.int64)[:, None] + np.arange(height)).ravel()
@@ -170,7 +170,7 @@ class HypothesisPairs:
 
     @staticmethod
     def of(evidence: Evidence, sides: Sequence[Hypothesis], offered: Measurement, sigma: float) -> HypothesisPairs:
-        """Those between the sides; `sigma` is the noise of a value, um."""
+        """The pairs between the sides; `sigma` is the noise of a value, um."""
         new = seen_at(evidence.background.data, offered)
         pairs = [[(true, other) for other in sides if other is not true] for true in sides]
         contests = [[_contest(evidence, new, *pair, sigma) for pair in own] for own in pairs]
@@ -189,7 +189,7 @@ class HypothesisPairs:
 
     @property
     def told_from_first(self) -> tuple[str, ...]:
-        """The others that can be told from the first name, or it from them."""
+        """The other names that can be told from the first one, or it from them."""
         ways = zip(self.names[1:], self.able[0], self.able[1:], strict=True)
         return tuple(name for name, there, back in ways if there or back[0])
 

@@ -420,7 +420,7 @@ class Comparison:
         return self.weights[key]
 
     def sketched(self, members: Members) -> float:
-        """The same at first sight: of effects that are shaped as in the catalogue."""
+        """As `weight`, at first sight: of effects that are shaped as in the catalogue."""
         return self._plain(members) - self.paid(members)
 
     def paid(self, members: Members) -> float:

@@ -415,7 +415,7 @@ def _warm(measured: MeasuredRange) -> list[tuple[dict[str, Any], Array]]:
 
 
 def _loaded(measured: MeasuredRange) -> list[tuple[dict[str, Any], Array]]:
-    """The same of the load."""
+    """The load as an option of effects."""
     options = {"basis": Polynomial(degree=(1,)), "input": "load_kg", "center": 0.0, "scale": 100.0}
     return [(options, np.eye(1))] if "load_kg" in measured.columns else []
 

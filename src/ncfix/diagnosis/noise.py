@@ -109,7 +109,7 @@ class Contrasts:
 
 
 def error_contrasts(base: Array) -> Contrasts:
-    """Those of what is free."""
+    """The contrasts of what is free."""
     size = np.linalg.norm(base, axis=0)
     scaled = base[:, size > 0] / size[size > 0]
     basis = orthonormal(scaled)
@@ -134,8 +134,9 @@ def everything_covariance(data: ResidualData, named: Sequence[EffectForm]) -> Ar
 
 
 def everything_at(data: ResidualData, named: Sequence[EffectForm], ahead: Sequence[Array]) -> tuple[Array, Array]:
-    """The same of v values at further poses, of which each form shows `ahead` (v, p) um: (v, v), and with the old
-    values, (v, m).
+    """As `everything_covariance`, of v values at further poses: (v, v), and with the old values, (v, m).
+
+    ahead  (v, p) um, what each form shows there
     """
     new = side_by_side([np.zeros((len(ahead[0]) if ahead else 0, 0)), *_everything(named, ahead)])
     old = side_by_side([np.zeros((len(data.y), 0)), *_everything(named, (group.columns for group in named))])

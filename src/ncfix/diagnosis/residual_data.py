@@ -99,7 +99,7 @@ class ResidualData:
 
     @cached_property
     def little(self) -> float:
-        """The same of what is too small to matter: no more than the noise makes it."""
+        """The scale of what is too small to matter: no more than the noise makes it."""
         return little_of(self.machine, self.sigma)
 
     @property
@@ -381,17 +381,17 @@ class Misfit:
 
     @property
     def free(self) -> float:
-        """The same with constants free."""
+        """What is left with the constants free."""
         return self.left(FREE_UM)
 
     @property
     def constants(self) -> Array:
-        """Those of the file where the data have them."""
+        """The constants of the file where the data have them."""
         return self._fitted(USUAL_UM)[1]
 
     @property
     def coefficients(self) -> Array:
-        """Those that are loose."""
+        """The constants that are loose."""
         every = self._fitted(TIGHT_UM)[1]
         return every[len(every) - self.loose :]
 

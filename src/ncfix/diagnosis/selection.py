@@ -102,8 +102,10 @@ def _white(evidence: Evidence, group: int, share: float) -> Array:
 
 
 def _leading(evidence: Evidence, group: int, share: float) -> Array:
-    """The same of the effect itself, each column 1 um at the tool tip: its shape in the catalogue does not count, nor
-    what only comes with it, as a constant with a play, which stands in no name's place.
+    """As `_white`, of the effect itself, each column 1 um at the tool tip.
+
+    Its shape in the catalogue does not count, nor what only comes with it, as a constant with a play, which stands in
+    no name's place.
     """
     form, background = evidence.groups[group], evidence.background
     sizes, effects = np.sqrt((form.columns**2).sum(axis=0)), form.owner.effects[: form.owner.lead]
@@ -209,7 +211,7 @@ def _climbed(scale: Comparison, offered: Sequence[str], members: Members, fixed:
 
 
 def _promising(scale: Comparison, changes: list[dict[str, Member]], members: Members) -> list[dict[str, Member]]:
-    """Those that leave effects away, and of the others the best at first sight."""
+    """All changes that only leave effects away, and the best of the others at first sight."""
     fewer = [each for each in changes if len(each) <= len(members) and set(each) <= set(members)]
     other = [each for each in changes if each not in fewer]
     return fewer + sorted(other, key=scale.sketched, reverse=True)[:WEIGHED]

@@ -175,7 +175,7 @@ def _gaps(
 def _compiled_gaps(
     perfect: Route, route: Route, meant: Poses, done: Sequence[Poses], target: Array | None
 ) -> tuple[Array, Array]:
-    """The same, (k, n, 3), compiled; and the largest squared angles of small motions that were met with, (k, n)."""
+    """As `_gaps`, (k, n, 3), compiled; and the largest squared angles of small motions that were met with, (k, n)."""
     from ncfix.core import chain
 
     kinds = [meant, *(each for each in done if each is not meant)]

@@ -129,7 +129,7 @@ class SmallMotion:
         return moved if self.rotation is None else _turned(-self.rotation, self.center, moved, weight)
 
     def _compiled(self, moved: Array, weight: Weight, forwards: bool) -> Array | None:
-        """The same by the compiled core; None unless rotation and translation differ from pose to pose."""
+        """The motion done by the compiled core; None unless rotation and translation differ from pose to pose."""
         rotation, translation = self.rotation, self.translation
         if rotation is None or translation is None or not _is_many(moved):
             return None

@@ -53,7 +53,7 @@ class Dependence:
 
     @property
     def signals(self) -> frozenset[Signal]:
-        """Those that it needs."""
+        """The signals that it needs."""
         return frozenset(each for each in (self.signal, self.factor) if each is not None)
 
     @property

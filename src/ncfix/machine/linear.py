@@ -126,7 +126,7 @@ class Dependences:
 
     @staticmethod
     def of(axes: tuple[Axis, ...], effects: Sequence[Effect]) -> Dependences:
-        """Those of these effects."""
+        """What these effects depend on."""
         numbers: dict[object, int] = {}
         own: list[int] = []
         ways: list[Dependence] = []

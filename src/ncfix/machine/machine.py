@@ -96,7 +96,7 @@ class Machine:
         return self._model.inputs - {"tool_length"}
 
     def replace(self, **changes: Any) -> Machine:
-        """The same machine with some fields changed."""
+        """This machine with some fields changed."""
         return dataclasses.replace(self, **changes)
 
     @cached_property
@@ -359,7 +359,7 @@ class Machine:
         return poses_first(found, shape)
 
     def design_columns(self, q: Array, state: State, effects: Sequence[Effect]) -> Array:
-        """The same column by column, (6, k, n) for q (n, n_axes): quicker where there are many effects."""
+        """As `design`, column by column, (6, k, n) for q (n, n_axes): quicker where there are many effects."""
         return self._design(q, state, tuple(effects))[1]
 
     def _design(self, q: ArrayLike, state: State, effects: tuple[Effect, ...]) -> tuple[tuple[int, ...], Array]:
@@ -373,7 +373,7 @@ class Machine:
         return self._with_signals(q, state, model.signals if model is not None else frozenset())
 
     def _with_signals(self, q: ArrayLike, state: State, signals: frozenset[Signal]) -> tuple[tuple[int, ...], Poses]:
-        """The same with these signals."""
+        """The common leading shape, and the poses with these signals."""
         if self.conditions and signals:
             state = dataclasses.replace(state, inputs={**self.conditions, **state.inputs})
         shape, poses = flatten(q, state, self.axes, inputs_of(signals))

@@ -211,7 +211,7 @@ class Route:
         return self.carried(poses, turns, steps.at_tip(self.plain[0], poses.tool_length))
 
     def carried(self, poses: Poses, turns: Turns, point: Sequence[Array] | Array) -> tuple[Array, Array]:
-        """The same of any point (3, n), not compiled."""
+        """As `tips`, of any point (3, n), not compiled."""
         legs, functions = self.plain
         results, values = [0.0] * len(functions.order), [0.0] * (PARTS * (1 + max(legs.small, default=-1)))
         steps.work_out_functions(functions, poses.positions, *turns, self.terms.given(poses), results)
@@ -428,7 +428,7 @@ def _nominal(index: int, joint: JointModel) -> list[Link]:
 
 
 def _forth(index: int, joint: JointModel, groups: tuple[EffectGroup, ...]) -> list[Link] | None:
-    """The same with its errors; None where it cannot be written as steps."""
+    """As `_nominal`, with the errors of the joint; None where it cannot be written as steps."""
     placed = (*joint.location, *joint.carried)
     if any(slot in group.slots and group.signals for group in groups for slot in placed):
         return None

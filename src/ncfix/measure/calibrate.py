@@ -139,7 +139,7 @@ def _rms(residuals: Residuals, values: Array, keep: Mask) -> float:
 
 
 def _rms_before(problem: Problem, residuals: Residuals) -> float:
-    """The same about the machine as it was, with the set-up fitted."""
+    """As `_rms`, about the machine as it was, with the set-up fitted."""
     residual = problem.residual(problem.selection.start, problem.start) / problem.sigma
     basis = orthonormal(problem.nuisance(problem.start) / problem.sigma[:, None])
     return _rms(residuals, without(basis, residual) * problem.sigma, np.ones(len(residual), dtype=bool))

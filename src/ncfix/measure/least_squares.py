@@ -202,7 +202,7 @@ def _independent(
 
 
 def _known(scaled: Array, chosen: Index, most: Array) -> tuple[Index, Array, Array]:
-    """Those of the chosen columns whose factors are known to `most` (s,), and their QR factors.
+    """The chosen columns whose factors are known to `most` (s,), and their QR factors.
 
     The one that is known least is left out, and all others are looked at anew: of columns whose sum alone is seen, one
     goes and the others are known.
@@ -293,7 +293,7 @@ def outliers(solution: Solution) -> NDArray[np.bool_]:
 
 
 def _confirmed(suspected: NDArray[np.bool_], size: Array, columns: Array, residual: Array) -> NDArray[np.bool_]:
-    """Those of the suspected (m,) that least squares of all others do not predict; the rest is no longer suspected.
+    """The suspected values (m,) that least squares of all others do not predict; the rest is no longer suspected.
 
     With few values for the unknowns a robust fit follows some of them and leaves the others out in the cold; the t
     distribution of what the others predict allows for how little they know. Residuals are those of least squares, of

@@ -202,11 +202,11 @@ class Measurement:
         return Place(self.path, int(self.lines[row]) if len(self.lines) else row + 1)
 
     def with_columns(self, values: Mapping[str, Array]) -> Measurement:
-        """The same rows with some columns new or replaced."""
+        """These rows with some columns new or replaced."""
         return replace(self, columns={**self.columns, **values})
 
     def with_header(self, key: str, text: str) -> Measurement:
-        """The same rows with one header line set."""
+        """These rows with one header line set."""
         rest = tuple(pair for pair in self.headers if pair[0] != key)
         return replace(self, headers=(*rest, (key, text)))
 

@@ -169,7 +169,7 @@ class Observation(ABC):
 
     @cached_property
     def _repeatability(self) -> float | None:
-        """That of its lengths, mm; computed once."""
+        """The repeatability of its lengths, mm; computed once."""
         return repeatability(self.measurement, self.components, self.angular)
 
     def with_values(self, values: Array) -> Measurement:

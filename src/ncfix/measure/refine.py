@@ -153,7 +153,7 @@ def _best_outside(design: Array, left: Array, inside: Mask, start: int, banned: 
 
 
 def _without(problem: Problem, chosen: Mask) -> Problem:
-    """The same problem without the coefficients that are not chosen."""
+    """This problem without the coefficients that are not chosen."""
     effects: list[Effect] = []
     free: list[bool] = []
     at = 0

@@ -96,7 +96,7 @@ class Compensation:
         return total
 
     def for_tool(self, length: float) -> Compensation:
-        """The same: tables know nothing of tools."""
+        """This compensation: tables know nothing of tools."""
         return self
 
     @property

@@ -88,7 +88,7 @@ class PartSelection:
         self.chosen = frozenset((face, n) for face, parts in self.faces.items() for n in range(len(parts.parts)))
 
     def again(self) -> PartSelection:
-        """The same, to be changed on its own."""
+        """A copy, to be changed on its own."""
         return copy(self)
 
     @property

@@ -178,7 +178,7 @@ def _sobol_net(dimensions: int) -> Array:
 
 
 def followed(sample: TableSample, layouts: TableLayouts, along: AlongAxis) -> dict[int, list[TableLayout]]:
-    """The same layouts with their functions at the fine positions of each axis."""
+    """These layouts with their functions at the fine positions of each axis."""
     curves: dict[tuple[int, int | None], Curves] = {}
     for axis in range(len(sample.nodes)):
         concerned = [(output, one) for output, each in layouts.items() for one in each if axis in one.axes]

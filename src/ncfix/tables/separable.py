@@ -86,7 +86,7 @@ def taken_apart(values: Array) -> Separation:
 
 
 def taken_apart_along(values: Array, axis: int) -> Separation:
-    """The same, with every part a function of `axis` at least: what changes sign with the way that axis moves.
+    """As `taken_apart`, with every part a function of `axis` at least: what changes sign with the way that axis moves.
 
     A function of another axis alone becomes a product with a constant.
     """
@@ -247,7 +247,7 @@ def _as_shares(goal_bytes: bytes, size: float, centres: tuple[bytes, ...], toler
 
 
 def absorbed(layout: TableLayout, tolerance: float) -> TableLayout:
-    """The same function with fewer tables: sums hidden in the factors of products, where they are multiples of them.
+    """This function with fewer tables: sums hidden in the factors of products, where they are multiples of them.
 
     The values may be those at the nodes or at any other positions. The constant goes into a sum, if there is one.
     """

@@ -123,7 +123,7 @@ class Volume:
     def over_all(
         cls, machine: Machine, inputs: tuple[str, ...], space: Array, tool_length: float, area: bool = False
     ) -> Volume:
-        """The same, in the middle of what is asked for over the whole range of the other axes.
+        """As `of`, in the middle of what is asked for over the whole range of the other axes.
 
         What other positions of the other axes add to a correction is levers and turns, which change slowly with where
         the inputs stand: it is worked out on a coarse grid of them, as fine as it takes, and straight in between.

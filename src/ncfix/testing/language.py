@@ -119,7 +119,7 @@ def gcode_leads(head: str, words: Sequence[str], mode: int) -> bool:
 
 
 def gcode_statements(dialect: Dialect) -> Statements:
-    """Those of a dialect of G code (RS274, Fanuc and their like), with the codes and cycles of its own."""
+    """The statements of a dialect of G code (RS274, Fanuc and their like), with the codes and cycles of its own."""
     own = tuple(code for code, _ in dialect.codes)
     alike = {code: each.code for code, operations in dialect.codes for each in operations if isinstance(each, Like)}
     drills = {code: f"{code} X10. Y20. Z-5. {table.level}2." for code, table in dialect.cycles}

@@ -66,7 +66,7 @@ def single_error(effect: str, size: float = 0.01, topology: str = "w F X Y Z t")
 
 
 def _rotary_error(effect: str) -> Machine:
-    """The same with tables B and C under the workpiece, and an angular error of one, 1e-4 rad at 200 degrees."""
+    """A machine with tables B and C and an angular error of one, 1e-4 rad at 200 degrees."""
     axes = AXES.format(name=f"only {effect}", topology="w C B F X Y Z t", sense=1)
     return loads(axes + TABLES + EFFECT.format(effect=effect, size=1e-4, half=0.5e-4))
 

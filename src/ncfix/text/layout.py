@@ -81,7 +81,7 @@ class BlockWords:
         self.axes = {word.address: word for word in self.words if word.address in AXIS_LETTERS}
 
     def some(self, addresses: Iterable[str]) -> dict[str, Word]:
-        """Those of these addresses that the block has, in this order."""
+        """The words of these addresses that the block has, in this order."""
         return {address: self.by_address[address] for address in addresses if address in self.by_address}
 
     def coded(self, address: str, codes: frozenset[float]) -> tuple[Word, ...]:
@@ -152,7 +152,7 @@ def bulk_layout(program: Program, block: int, layout: Layout) -> BulkLayout | No
 
 
 def arc_layout(program: Program, block: int, layout: Layout) -> ArcLayout | None:
-    """The same of the words of an arc; None if one of them is no plain number, or R stands beside a centre."""
+    """Where the words of an arc stand; None if one of them is no plain number, or R stands beside a centre."""
     slots = {letter: word.value.slot for letter, word in layout.centre.items() if isinstance(word.value, Literal)}
     word = layout.radius
     if len(slots) < len(layout.centre) or (word is not None and (slots or not isinstance(word.value, Literal))):

@@ -109,13 +109,13 @@ class Scan:
         return np.arange(len(self.comment)) if self.group is None else self.group
 
     def expanded(self) -> Scan:
-        """The same, with a shape for each block."""
+        """This scan with a shape for each block."""
         if self.group is None:
             return self
         return replace(self, shapes=[self.shapes[index] for index in self.group.tolist()], group=None)
 
     def setting_apart(self, blocks: Sequence[int]) -> Scan:
-        """The same, where some blocks must be taken as they are."""
+        """This scan, where some blocks must be taken as they are."""
         if not len(blocks):
             return self
         found = self.expanded()

@@ -88,11 +88,11 @@ class Splices:
         return cls(start[order], stop[order], length[order], b"".join(data[slice(*each)] for each in edges))
 
     def moved(self, way: int) -> Splices:
-        """The same so many bytes further on."""
+        """These splices so many bytes further on."""
         return replace(self, start=self.start + way, stop=self.stop + way)
 
     def outside(self, spans: NDArray[np.int64]) -> Splices:
-        """Those that are not within spans (k, 2) of the source, which are apart from each other; in any order."""
+        """The splices that are not within spans (k, 2) of the source, which are apart from each other; in any order."""
         starts, stops = np.sort(spans, axis=0).T
         at = np.searchsorted(starts, self.start, side="right") - 1
         outside = (at < 0) | (self.start > stops[at])

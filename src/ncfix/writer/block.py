@@ -378,7 +378,7 @@ class BlockWriter(BlockText):
         return [round(float(part) * self.vector_length, self.vector_digits) for part in direction]
 
     def _direction_words(self, end: FloatArray) -> list[str]:
-        """Those of a further piece."""
+        """The words of direction of a further piece."""
         return list(map(self._component, self.spelling.vector, self._vector(end)))
 
     def _turn(self, position: FloatArray, end: FloatArray) -> None:

@@ -149,7 +149,7 @@ class Target:
         return self.arc_code if self.arcs[-1] else LINE
 
     def at_their_pace(self) -> Target:
-        """The same; a turn in inverse time that LinuxCNC would hurry as one whose time is kept by a feed per minute."""
+        """This target, with a feed per minute for a turn that LinuxCNC would hurry in inverse time."""
         path = np.vstack((self.start, np.round(self.ends * 10.0**self.decimals) / 10.0**self.decimals))
         linear = [letter not in FEED_GROUPS[-1] for letter in self.letters]
         steps = np.linalg.norm(np.diff(path, axis=0)[:, linear], axis=1)

@@ -123,7 +123,7 @@ class FixJob:
     verbose: bool = False
 
     def noted_in(self, journal: str) -> FixJob:
-        """The same with a journal."""
+        """This job with a journal."""
         versions = [(plugin.name, plugin.version) for plugin in load_plugins().loaded]
         machine = (self.machine.hash, self.machine.name, self.machine.control)
         how = (__version__, versions, machine, self.setup, self.dialect, self.options)

@@ -46,7 +46,7 @@ class Pages:
         targets: Sequence[OutputTarget],
         read: Sequence[str | None],
     ) -> Pages:
-        """Those that are asked for. Raises `UsageError` if they cannot be, before anything is done.
+        """The pages that are asked for. Raises `UsageError` if they cannot be, before anything is done.
 
         targets  where the programs come from and go to
         read     other inputs

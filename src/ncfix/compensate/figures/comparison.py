@@ -125,7 +125,7 @@ class PartEnd:
 
     @classmethod
     def behind(cls, bodies: BacklashBodies, lines: Index) -> PartEnd:
-        """Those at the end of motions in lines (n,)."""
+        """The end of motions in lines (n,)."""
         start, moves = max(len(lines) - 2 * BESIDE, 0), bodies.intent.moves
         last = motions_taken(moves, np.arange(start, len(lines)))
         return cls(last, lines[start:], bodies.came(start), bodies.before(start))

@@ -243,7 +243,7 @@ class Curve:
 
     @cached_property
     def lying(self) -> Index:
-        """Those that have a length, ascending."""
+        """The pieces that have a length, ascending."""
         return np.flatnonzero(self.ways > 0)
 
     @cached_property

@@ -63,7 +63,7 @@ class Nearest:
     gap: Array
 
     def shifted(self, by: int) -> Nearest:
-        """The same, with the parabolas counted from elsewhere."""
+        """These places, with the parabolas counted from elsewhere."""
         return replace(self, piece=self.piece + by)
 
     def way(self, curve: Curve) -> Array:
@@ -337,7 +337,7 @@ class NearestInterval:
     behind: Nearest
 
     def leaping(self, search: Search, path: Curve) -> NearestInterval:
-        """Those on which there may be a peak beyond what is near enough."""
+        """The intervals on which there may be a peak beyond what is near enough."""
         way, near = path.ways[self.piece] * (self.high - self.low), search.near
         begin, end = (search.curve.way(each.piece, each.share) for each in (self.before, self.behind))
         within = (self.before.gap <= near) & (self.behind.gap <= near)

@@ -252,7 +252,7 @@ class _Places:
 
     @classmethod
     def of(cls, solution: WrittenPlan, mine: Mask) -> _Places:
-        """Those at which figures look, and some more where the way is bent."""
+        """The places at which figures look, and some more where the way is bent."""
         written, intent = solution.written, solution.intent
         which = np.flatnonzero(mine[written.pieces.move])
         piece, fraction = _bent(written, which)

@@ -199,7 +199,7 @@ class Intent:
 
     @cached_property
     def _directions(self) -> tuple[Signs, Signs] | None:
-        """Those at the starts and at the ends."""
+        """The directions at the starts of motions and at their ends; None if no error depends on them."""
         if not matters(self.machine):
             return None
         lost = ~np.isfinite(self.moves.end - self.moves.start)

@@ -105,7 +105,7 @@ class MeasuredRange:
         return {"center": (low + high) / 2, "scale": max((high - low) / 2, 1e-6)}
 
     def factor(self, axis: Axis) -> dict[str, Any]:
-        """The same for an axis that multiplies."""
+        """`center` and `scale` of an axis that multiplies an effect."""
         found = self.scaled(axis)
         return {"times": axis.name, "times_center": found["center"], "times_scale": found["scale"]}
 
@@ -197,21 +197,19 @@ def time_course(length: float, pieces: int) -> Array:
 
 @lru_cache(maxsize=64)
 def bent_loading(length: float) -> Array:
-    """The same without its mean and slope: those are constants of the machine."""
+    """A spline loading without its mean and slope: those are constants of the machine."""
     return smooth_loading(length) - _straight(length, 2)
 
 
 @lru_cache(maxsize=64)
 def leaning_loading(length: float) -> Array:
-    """The same without its mean, and with half of its slope: where there is no constant for that, others stand for it
-    in part.
-    """
+    """A spline loading without its mean, and with half of its slope: other constants stand for that in part."""
     return smooth_loading(length) - 0.5 * (_straight(length, 1) + _straight(length, 2))
 
 
 @lru_cache(maxsize=64)
 def turned_loading(length: float) -> Array:
-    """The same with half of its mean: where a tilt is zero, nobody knows; in part that is a constant of the machine."""
+    """A spline loading with half of its mean: where a tilt is zero nobody knows; in part that is a constant."""
     return smooth_loading(length) - 0.5 * _straight(length, 1)
 
 

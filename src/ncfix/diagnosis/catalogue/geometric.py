@@ -203,7 +203,7 @@ def _seat(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
 
 
 def location_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
-    """Those that the file lacks.
+    """The location errors that the file lacks.
 
     Gains, and lines of which the file says nothing, go before all other effects. Where it has some of the lines, what
     it lacks says the same again for the most part: those are names like others.

@@ -69,7 +69,7 @@ class CurvesOfFile:
 
     @staticmethod
     def of(now: Misfit) -> CurvesOfFile:
-        """Those of the file of a misfit."""
+        """The curves of the file of a misfit."""
         problem, scale = now.problem, now.problem.um / (now.noise * now.relative)
         free = np.concatenate([problem.nuisance(problem.start), problem.design], axis=1) * scale[:, None]
         basis = orthonormal(free)
@@ -89,12 +89,12 @@ class CurvesOfFile:
 
     @property
     def foreign(self) -> float:
-        """The same where no curve of the file holds, and each is another one of its size."""
+        """Log likelihood where no curve of the file holds, and each is another one of its size."""
         return self._likelihood(self.y + np.sum(self.shown, axis=0), range(len(self.drawn)), 1.0)
 
     @property
     def changed(self) -> float:
-        """The same where some of the curves have changed, less what these pay: the likeliest of them."""
+        """Log likelihood where some of the curves have changed, less what these pay: the likeliest of them."""
         price, best = FURTHER + float(np.log(len(self.drawn))), self.as_given
         chosen: tuple[int, ...] = ()
         while len(chosen) < len(self.drawn):

@@ -253,7 +253,7 @@ def points_of_axes(measurements: tuple[Measurement, ...], machine: Machine, now:
 
 
 def looking_like_constants(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[Mistake]:
-    """Those of them that constants which moved explain as well: readings of a probe that shrink are all near a ball."""
+    """The mistakes that constants which moved explain as well: readings of a probe that shrink are all near a ball."""
     yield from points_of_axes(measurements, machine, now)
     if any(each.kind == "probe" for each in measurements):
         yield from units(measurements, machine)

@@ -130,7 +130,7 @@ def units_of_tools(measurements: tuple[Measurement, ...], machine: Machine) -> I
 
 
 def units_of_one_file(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """The same mistakes of units in one of several files."""
+    """Mistakes of units in one of several files."""
     values = [len(each) * len(each.measured) for each in measurements]
     for k, each in enumerate(measurements) if len(measurements) > 1 else ():
         offered = [*units((each,), machine), *units_of_values((each,), machine)]

@@ -80,7 +80,7 @@ class Algebra:
         return _rounded(poly) if self.measured else poly
 
     def with_sines(self, poly: Poly) -> Poly:
-        """The same function with the cosines squared away instead of the sines."""
+        """This function with the cosines squared away instead of the sines."""
         for sine, cosine in self.pairs:
             poly = _replaced(poly, cosine, self._one_minus(sine))
         return poly

@@ -269,7 +269,7 @@ class Chain:
         return {variable.name: variable for variable in self.variables}[name]
 
     def without(self, names: Iterable[str]) -> Chain:
-        """The same chain with some errors set to zero."""
+        """This chain with some errors set to zero."""
         gone = set(names)
         zero = {variable.symbol: sp.Integer(0) for variable in self.smalls if variable.name in gone}
         steps = tuple(step.with_values(zero) for step in self.steps)
@@ -277,5 +277,5 @@ class Chain:
         return replace(self, variables=variables, steps=steps)
 
     def shifted(self, shift: Vector) -> Chain:
-        """The same chain seen from a frame whose origin is moved by -shift: `shift` is added to every position."""
+        """This chain seen from a frame whose origin is moved by -shift: `shift` is added to every position."""
         return replace(self, steps=(Translation(shift), *self.steps))
