@@ -12,7 +12,8 @@ from measure.poses import machine, perfect, plan
 from ncfix.diagnosis.assessment import ALONG
 from ncfix.diagnosis.catalogue import catalogue, without
 from ncfix.diagnosis.checks import remarks
-from ncfix.diagnosis.diagnosis import AMBIGUOUS, FOUND, NOTHING, Diagnosis, diagnose
+from ncfix.diagnosis.constants import judged_constants
+from ncfix.diagnosis.diagnosis import AMBIGUOUS, FOUND, NOTHING, Diagnosis, diagnose, weighed
 from ncfix.diagnosis.noise import estimated_background
 from ncfix.diagnosis.presentation import as_dict, text, with_provenance
 from ncfix.diagnosis.residual_data import residual_data
@@ -85,6 +86,23 @@ def test_constants_that_the_data_do_not_ask_to_change_stay(known: Machine, backl
     kept = backlash.machine.effects[: len(known.effects)]
     assert [each.coefficients for each in kept] == [each.coefficients for each in known.effects]
     assert backlash.moved == ()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_constants_that_do_not_pay_for_being_off_together_stay(known: Machine, seed: int) -> None:
+    """Each is off by half a micrometre or so: together more than chance makes of them, and no finding."""
+    random = np.random.default_rng(seed)
+    sizes = [random.choice((-1, 1)) * (2e-6 if effect.rotational else 4e-4) for effect in known.effects]
+    days = known.replace(
+        effects=tuple(
+            replace(e, coefficients=(e.coefficients[0] + size,)) for e, size in zip(known.effects, sizes, strict=True)
+        )
+    )
+    evidence = weighed([measured(days, 120, seed)], known)[1].evidence
+    constants = judged_constants(evidence, (), evidence.share(()))
+    assert constants.p_value < 1e-6
+    assert constants.odds >= 0  # what is off pays, what does not is as the file has it
+    assert not constants.whole
 
 
 def test_constants_that_the_data_put_elsewhere_are_said_and_changed(known: Machine) -> None:

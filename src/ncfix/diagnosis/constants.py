@@ -253,14 +253,14 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
     left, spare = distance - explained, len(kept) - len(chosen)
     whole = spare > 0 and left > spare + DOUBT * np.sqrt(2 * spare) and left > 2 * DOUBT**2
     whole &= left > explained or len(chosen) == MOST  # else the chosen ones matter, the others are the day's
+    every = [int(each) for each in kept]
+    whole = whole and _weight(asked, every, offered) > asked.likelihood()  # else they are the day's, all of them
     if whole:
-        chosen, places = [int(each) for each in kept], np.arange(len(kept), dtype=np.int64)
+        chosen, places = every, np.arange(len(every), dtype=np.int64)
     spread: Array = _inverse(inner[np.ix_(places, places)])
     change = np.zeros(k)
     change[chosen] = spread @ seen[places]
-    plain = asked.likelihood()
-    paid = _price(len(chosen), len(offered))
-    odds = asked.likelihood(chosen) - plain - paid if chosen else 0.0
+    odds = _weight(asked, chosen, offered) - asked.likelihood()
     basis = orthonormal(asked.setup / data.relative[:, None])
 
     def beside(shown: Array) -> Array:
@@ -291,6 +291,7 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
         )
     shown = beside(asked.constants @ change)
     moved.sort(key=lambda each: -each.size_um)
+    paid = _price(len(chosen), len(offered))
     return ConstantsVerdict(
         change, tuple(moved), odds, distance, len(kept), data.size(shown), shown, solution, bool(whole), paid
     )
@@ -318,11 +319,16 @@ def _price(count: int, among: int) -> float:
     return count * float(np.log(max(among, 1))) + SURE + (count - 1) * FURTHER if count else 0.0
 
 
+def _weight(asked: FileLikelihood, moved: Sequence[int], offered: Sequence[int]) -> float:
+    """Log likelihood with these constants off, less what they pay."""
+    return asked.likelihood(moved) - _price(len(moved), len(offered))
+
+
 def _chosen(asked: FileLikelihood, offered: Sequence[int]) -> list[int]:
     """The constants whose change weighs most, found by adding, exchanging and dropping one at a time."""
 
     def weight(chosen: Sequence[int]) -> float:
-        return asked.likelihood(chosen) - _price(len(chosen), len(offered))
+        return _weight(asked, chosen, offered)
 
     chosen: list[int] = []
     best = weight(chosen)
