@@ -327,6 +327,16 @@ def test_a_sigma_counts_in_what_was_pruned(seed: int) -> None:
     assert missed < 4 * np.sqrt((deviations(found, q, state) ** 2).mean())
 
 
+def test_what_was_held_and_pruning_frees_has_a_sigma():
+    """An R-test sees how far two axes are apart: the one that stays carries the other, and its sigma says so."""
+    known = machine("wCBXFZYSt").replace(effects=(Effect("EX0B", (0.0,)), Effect("EX0C", (0.05,))))
+    data = simulate(plan(known, "tcp", 80), known, Faults(noise_um=1.0), seed=1)
+    assert np.isnan(calibrate([data], known).sigma).tolist() == [False, True]
+    found = calibrate([data], known, prune=0.99)
+    assert found.labels == ("EX0C",)
+    assert found.sigma[0] > 0.01  # a third of what is much, 0.1 mm
+
+
 def test_a_plan_is_proposed_where_more_poses_would_tell_apart():
     """One tool shows only a sum of a shift and a tilt of the spindle; a longer one tells them."""
     known = machine("three_axis").replace(effects=(Effect("EX0S", (0.01,)), Effect("EB0S", (3e-5,))))

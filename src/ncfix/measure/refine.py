@@ -26,7 +26,7 @@ from ncfix.machine.basis import Basis, Polynomial
 from ncfix.machine.piecewise import Truncated
 from ncfix.measure.estimate import HOPELESS, Estimate, LeftOut, Problem, fit, noise_scale
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.observation import Mask
 from ncfix.measure.selection import Selection, labels_of
 
@@ -51,8 +51,9 @@ def pruned(problem: Problem, estimate: Estimate, level: float, loss: str) -> tup
 
 def _covariance(problem: Problem, estimate: Estimate, stays: Mask, found: Estimate) -> Array:
     """Of all coefficients of a problem about those `found` without some of them, for a noise of one, (p, p)."""
-    kept, scale = estimate.solution.kept, noise_scale(problem, estimate) or 1.0
-    design, target = _alone(problem, estimate)
+    told = np.flatnonzero(stays)[found.solution.kept]  # one that was held beside what went may be told now
+    kept, scale = np.union1d(estimate.solution.kept, told), noise_scale(problem, estimate) or 1.0
+    design, target = _alone(problem, estimate, kept)
     usual = USUAL * problem.limits[kept] / HOPELESS
     held = np.diag(np.where(stays[kept], 0.0, scale / usual))
     columns = np.concatenate([design[:, kept], held])
@@ -86,7 +87,7 @@ def _significant(problem: Problem, estimate: Estimate, risk: float) -> Mask:
     inside = np.zeros(len(estimate.coefficients), dtype=np.bool_)
     inside[estimate.solution.kept] = True
     held = ~inside & (estimate.coefficients != 0)
-    design, target = _alone(problem, estimate)
+    design, target = _alone(problem, estimate, estimate.solution.kept)
     start = int((estimate.weight > 0).sum()) - estimate.solution.nuisance.shape[1]
     banned = set(np.flatnonzero(held).tolist())
     while inside.any():
@@ -113,11 +114,11 @@ def _whole(selection: Selection, chosen: Mask) -> Mask:
     return stays
 
 
-def _alone(problem: Problem, estimate: Estimate) -> tuple[Array, Array]:
-    """What coefficients show beside the set-up, and what those that were estimated have to explain, in noises."""
+def _alone(problem: Problem, estimate: Estimate, kept: Index) -> tuple[Array, Array]:
+    """What coefficients show beside the set-up, and what those of them have to explain that are `kept`, in noises."""
     root, basis = np.sqrt(estimate.weight) / problem.sigma, estimate.solution.nuisance
     asked = np.zeros(len(estimate.coefficients))
-    asked[estimate.solution.kept] = estimate.coefficients[estimate.solution.kept]
+    asked[kept] = estimate.coefficients[kept]
     design = without(basis, problem.design * root[:, None])
     return design, without(basis, (estimate.residual + problem.design @ asked) * root)
 
