@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from machine import chains
-from ncfix.machine import Axis, Effect
-from ncfix.machine.axes import IDLE, component_names, component_title, squareness_meaning
+from ncfix.machine import Axis, Effect, Machine
+from ncfix.machine.axes import IDLE, GaugeLine, component_names, component_title, squareness_meaning
 from ncfix.machine.codes import CODES
+from ncfix.machine.state import State
 
 
 @pytest.mark.parametrize(
@@ -56,14 +57,44 @@ def test_the_stated_sense_of_squareness_is_what_the_machine_does() -> None:
     assert stated == 6
 
 
-def test_components_that_are_said_to_do_nothing_do_nothing() -> None:
-    machine = chains.four_kinds()["w X F Y Z C A t"]
+def odd() -> Machine:
+    """A quill W along Z that counts outwards, a table B at 45 degrees with error axes of its own, a joint J about X."""
+    s = float(np.sqrt(0.5))
+    triad = (1.0, 0.0, 0.0), (0.0, s, s), (0.0, -s, s)
+    axes = (
+        Axis("B", True, True, (0.0, -s, s), (0.0, 0.0, 155.0), error_axes=triad),
+        Axis("X", False, True, (-1.0, 0.0, 0.0)),
+        Axis("Y", False, False, (0.0, 1.0, 0.0)),
+        Axis("J", True, False, (1.0, 0.0, 0.0), (0.0, 10.0, 60.0)),
+        Axis("W", False, False, (0.0, 0.0, -1.0)),
+    )
+    return Machine("odd", "w B X F Y J W t", axes, GaugeLine((0.0, 0.0, 1.0), (0.0, 0.0, 80.0)))
+
+
+MACHINES = (chains.four_kinds()["w X F Y Z C A t"], odd())
+
+
+@pytest.mark.parametrize("machine", MACHINES, ids=lambda machine: str(machine.topology))
+def test_components_that_are_said_to_do_nothing_do_nothing(machine: Machine) -> None:
     q = chains.random_positions(np.random.default_rng(0), machine, 5)
-    for name in component_names("XYZAC"):
+    for name in component_names(machine.axis_names):
         if len(name) == 4:
-            idle = IDLE in component_title(name)
+            idle = IDLE in component_title(name, machine.axis(name[-1]))
             error = machine.replace(effects=(Effect(name, (1e-4,)),)).error(q)
             assert idle == bool(np.abs(error).max() < 1e-10), name
+
+
+@pytest.mark.parametrize("machine", MACHINES, ids=lambda machine: str(machine.topology))
+def test_positioning_moves_the_tip_as_the_axis_does(machine: Machine) -> None:
+    """An error motion is called positioning, and the location error beside it zero offset, where it does just that."""
+    q = chains.random_positions(np.random.default_rng(0), machine, 5)
+    for column, axis in enumerate(machine.axes):
+        own = machine.axis_jacobian(q, 100.0)[..., column]
+        for name in component_names([axis.name]):
+            error = machine.replace(effects=(Effect(name, (1e-6,)),)).error(q, State(100.0)) * 1e6
+            alike = min(np.abs(error - own).max(), np.abs(error + own).max()) < 1e-2  # second order: 1e-6 of metres
+            assert alike == (component_title(name, axis).removeprefix("angular ").split()[0] in ("positioning", "zero"))
+            assert machine.is_positioning(name) == (alike and len(name) == 3)
 
 
 def test_every_code_is_explained() -> None:

@@ -10,7 +10,8 @@ import pytest
 
 from measure.poses import machine, plan
 from ncfix.diagnostics import ConfigError
-from ncfix.machine import Effect, Machine, State
+from ncfix.machine import Axis, Effect, Machine, State
+from ncfix.measure.calibrate import calibrate
 from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import dumps
 from ncfix.measure.reader import read, reads
@@ -268,6 +269,22 @@ def test_positioning_of_a_table_says_in_which_sense_it_counts():
         assert found.columns["value"].tolist() == [factor * 0.001, factor * 0.004, 0.002, 0.003]
         assert reads(dumps(found).encode(), THREE).columns["value"].tolist() == found.columns["value"].tolist()
     assert faults(f"{head}# sense: laser\n{rows}") == [("NCF603", 3, 10)]
+
+
+def test_positioning_is_along_the_error_axis_whatever_the_letter():
+    """Of a quill W that counts outwards, against Z: EZW is turned, and its slope is no alignment of the instrument."""
+    out = Axis("W", False, False, (0.0, 0.0, -1.0), range=(0.0, 300.0))
+    quill = THREE.replace(topology="w X Y F Z W t", axes=(*THREE.axes, out), effects=())
+    rows = "".join(f"W,EZW,{place},{2e-5 * place:.6f}\nW,EXW,{place},0.001\n" for place in range(0, 310, 30))
+    head = "# ncfix-measurement: 1\n# kind: axis\n# noise_um: 1\n"
+    columns = "axis,component,position,value\n"
+    assert {each.code for each in reads(f"{head}{columns}{rows}".encode(), quill).remarks} == {"NCF626"}
+    found = reads(f"{head}# sense: axis\n{columns}{rows}".encode(), quill)
+    assert found.columns["value"][::2] == pytest.approx(-2e-5 * found.columns["position"][::2])
+    assert (found.columns["value"][1::2] == 0.001).all()
+    calibrated = calibrate([found], quill, "EZW")
+    scale = calibrated.labels.index("EZW u^1")
+    assert calibrated.estimate.coefficients[scale] == pytest.approx(-2e-5 * 150)
 
 
 def test_direct_readings_in_radians_or_micrometres_are_remarked():

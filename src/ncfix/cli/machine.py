@@ -210,10 +210,10 @@ def _components(machine: Machine, with_all: bool) -> list[Row]:
     for name in component_names(letters + SPINDLE):
         effect = Effect(name, ())
         seen = instruments_for(name)
-        title = component_title(name, axes.get(name[-1]))
+        title = component_title(name, axis := axes.get(name[-1]))
         unit = "rad" if effect.rotational else "mm"
         square = squareness_meaning(name)
-        basis, much = usual_basis(name), large_size(name)
+        basis, much = usual_basis(name, axis), large_size(name)
         rows.append(_row(name, title, unit=unit, basis=basis, much=much, seen_by=seen, squareness=square))
     return rows
 

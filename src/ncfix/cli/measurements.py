@@ -187,10 +187,11 @@ def _print(calibration: Calibration, over: Prediction) -> None:
     console.table(("coefficient", "value", "sigma", "unit"), list(_rows(calibration)))
     for bar in _ball_bars(calibration):
         _say_bar(bar)
+    machine = calibration.problem.machine
     for row in _positioning(calibration):
         unit = "urad" if row["component"][1] in "ABC" else "um"
         known = [f"{name} {row[key]:.1f}" for key, name in FIGURES.items() if row[key] == row[key]]
-        own = row["component"][1] == row["component"][-1]
+        own = machine.is_positioning(row["component"])
         few = f" ({row['runs']} of the {FULL_TEST} runs that it asks for)" if own and row["runs"] < FULL_TEST else ""
         norm = "ISO 230-2" if own else "as in ISO 230-2"
         console.say(f"{row['component']} set {row['name']}, {norm}: {', '.join(known)} {unit}{few}")

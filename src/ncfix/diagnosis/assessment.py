@@ -150,11 +150,10 @@ def conditions(machine: Machine, effects: Sequence[Effect]) -> tuple[str, ...]:
 
 def _of_play(effect: Effect, basis: Backlash, rotary: set[str], alone: bool) -> Sequence[str]:
     """The controls that hold play: of an axis along or about itself in their places for that, else in tables."""
-    if effect.joint in rotary:
-        turned = len({name for name in (effect.signal, effect.times, effect.joint) if name}) == 1
-        return TURNED if turned and effect.name[1] == effect.joint and not effect.location else ("siemens",)
     if not alone:
         return ("siemens",)
+    if effect.joint in rotary:
+        return TURNED
     return REVERSAL if basis.degree == (0,) else ALONG
 
 
@@ -163,7 +162,7 @@ def _tables(machine: Machine, effect: Effect) -> Sequence[str]:
         return ()
     rotary = {axis.name for axis in machine.axes if axis.rotary}
     signals = {name for name in (effect.signal, effect.times, effect.joint) if name}
-    alone = len(signals) == 1 and effect.name[1] == effect.joint and not effect.location
+    alone = len(signals) == 1 and machine.is_positioning(effect.name)
     if isinstance(effect.basis, Backlash):
         return _of_play(effect, effect.basis, rotary, alone)
     if signals & rotary:

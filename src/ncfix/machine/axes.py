@@ -84,6 +84,20 @@ class Axis:
         """Internal units per unit of the machine file: rad per degree, or 1."""
         return DEGREE if self.rotary else 1.0
 
+    def reach(self, component: str) -> float:
+        """How far a component, X ... C, is along or about the axis: the cosine from `direction` to its error axis."""
+        return float(np.asarray(self.error_axes[COMPONENTS.index(component) % 3]) @ np.asarray(self.direction))
+
+    def owns(self, component: str) -> bool:
+        """Whether a component is the positioning of the axis: along a linear one, about a rotary one.
+
+        The error axes say so, not the letter: of a W along Z it is Z. Of an axis that is askew to all it is its letter.
+        """
+        near = abs(self.reach(component))
+        return (component in LINEAR) != self.rotary and (
+            near > 1 - SKEWED or (component == self.name and near > SKEWED)
+        )
+
     @property
     def screw(self) -> tuple[Array, Array]:
         """The twist of unit motion (v, w) about the base origin."""
@@ -294,31 +308,29 @@ def component_title(name: str, axis: Axis | None = None) -> str:
     Without the axis it goes by the letter: X Y Z U V W are linear, others rotary, and A B C turn about X Y Z.
     """
     component, zero, joint = _parts(name)
-    about, rotary = TURNS_ABOUT.get(component), axis.rotary if axis else joint not in "XYZUVW"
+    about = TURNS_ABOUT.get(component)
     if joint == SPINDLE:
         if about:
             return f"{'tilt' if zero else 'tilt motion'} of the spindle about {about}"
         return f"{'place' if zero else 'motion'} of the spindle in {component}"
-    if zero and axis and rotary and about:
-        own = abs(sum(a * b for a, b in zip(axis.error_axes[LINEAR.index(about)], axis.direction, strict=True)))
-        if own > 1 - SKEWED:
-            return f"zero offset of {joint}"
-        return f"tilt of the axis line of {joint}, turned about {about}"
+    axis = axis or _by_letter(joint)
     if zero:
-        return _location_title(component, joint, rotary)
-    if component == joint:
-        return f"{'angular ' if rotary else ''}positioning of {joint}"
+        return _location_title(component, axis)
+    near = abs(axis.reach(component))
+    if axis.owns(component):
+        return f"{'angular ' if axis.rotary else ''}positioning of {joint}"
     if about:
-        return f"tilt of {joint} about {about}" if rotary or about != joint else f"roll of {joint}"
-    if not rotary:
+        return f"tilt of {joint} about {about}" if axis.rotary or near < 1 - SKEWED else f"roll of {joint}"
+    if not axis.rotary:
         return f"straightness of {joint} in {component}"
-    if axis is None:
-        sense = "axial " if component == TURNS_ABOUT.get(joint) else "radial "
-    else:  # along the axis line or across it; neither for a skewed axis
-        pairs = zip(axis.error_axes[LINEAR.index(component)], axis.direction, strict=True)
-        along = abs(sum(a * b for a, b in pairs))
-        sense = "axial " if along > 1 - SKEWED else "radial " if along < SKEWED else ""
+    sense = "axial " if near > 1 - SKEWED else "radial " if near < SKEWED else ""  # neither for a skewed axis
     return f"{sense}motion of {joint} in {component}"
+
+
+def _by_letter(joint: str) -> Axis:
+    """The axis that a letter usually stands for, in the directions of the base axes."""
+    place = "XYZABCUVW".find(joint)
+    return Axis(joint, joint not in "XYZUVW", True, BASE_AXES[place % 3] if place >= 0 else ORIGIN)
 
 
 def _parts(name: str) -> tuple[str, str, str]:
@@ -330,17 +342,17 @@ def _parts(name: str) -> tuple[str, str, str]:
     return component, zero, joint
 
 
-def _location_title(component: str, joint: str, rotary: bool) -> str:
-    about = TURNS_ABOUT.get(component)
-    if component == joint:
+def _location_title(component: str, axis: Axis) -> str:
+    joint, about, own = axis.name, TURNS_ABOUT.get(component), abs(axis.reach(component)) > 1 - SKEWED
+    if axis.owns(component) and (own or not axis.rotary):
         return f"zero offset of {joint}"
     if about:
-        if not rotary and about == joint:
+        if own:
             return f"roll of {joint} as a whole; {IDLE}"
-        return f"{'tilt of the axis line' if rotary else 'direction'} of {joint}, turned about {about}"
-    if not rotary:
+        return f"{'tilt of the axis line' if axis.rotary else 'direction'} of {joint}, turned about {about}"
+    if not axis.rotary:
         return f"offset of the line of {joint} in {component}; {IDLE}"
-    if component == TURNS_ABOUT.get(joint):
+    if own:
         return f"offset of {joint} along its axis line, {component}; {IDLE}"
     return f"offset of the axis line of {joint} in {component}"
 
@@ -375,16 +387,16 @@ def instruments_for(name: str) -> str:
     return "tcp tcp6 probe points length" + ("" if zero else " axis")
 
 
-def usual_basis(name: str) -> str:
-    """The basis that suits a component: what identifiability leaves to it."""
+def usual_basis(name: str, axis: Axis | None = None) -> str:
+    """The basis that suits a component: what identifiability leaves to it. Without the axis it goes by the letter."""
     match = NAME.fullmatch(name)
     if match is None or match[2] or match[3] == SPINDLE:
         return "constant"
     component, _, joint = match.groups()
-    if joint not in "XYZUVW":
-        along = component in (joint, TURNS_ABOUT.get(joint))
-        return f"fourier order {1 if along else 2} up"
-    return "polynomial degree 2 up" if component in LINEAR and component != joint else "polynomial degree 1 up"
+    axis = axis or _by_letter(joint)
+    if axis.rotary:
+        return f"fourier order {1 if abs(axis.reach(component)) > 1 - SKEWED else 2} up"
+    return f"polynomial degree {2 if component in LINEAR and not axis.owns(component) else 1} up"
 
 
 def large_size(name: str) -> str:

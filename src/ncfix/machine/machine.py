@@ -75,6 +75,11 @@ class Machine:
         """The axis with this letter; None for a name that is none."""
         return next((axis for axis in self.axes if axis.name == name), None)
 
+    def is_positioning(self, name: str) -> bool:
+        """Whether an ISO 230-1 error motion is the positioning of its axis: EXX of X, EZW of a W along Z."""
+        axis = self.axis(name[-1])
+        return axis is not None and len(name) == 3 and axis.owns(name[1])
+
     @cached_property
     def rotary(self) -> NDArray[np.bool_]:
         """Which axes are rotary, shape (n_axes,)."""

@@ -91,7 +91,9 @@ def _named(measurement: Measurement, machine: Machine) -> Iterator[Message]:
             yield Message("NCF610", f"the machine has no axis {axis}, only {has}", measurement.place(row))
         elif component_of(axis, component) is None:
             text = f"{component!r} is no error motion of {axis}"
-            yield Message("NCF612", text, measurement.place(row), f"for example E{COMPONENTS[0]}{axis}")
+            names = [f"E{each}{axis}" for each in COMPONENTS]
+            own = next(filter(machine.is_positioning, names), names[0])
+            yield Message("NCF612", text, measurement.place(row), f"for example {own}")
 
 
 def _lengths(measurement: Measurement) -> Iterator[Message]:

@@ -122,9 +122,9 @@ class DirectReading(Observation):
     @cached_property
     def _sloped(self) -> Index:
         """The series that are straightness of a linear axis."""
-        rotary = {axis.name: axis.rotary for axis in self.machine.axes}
-        straight = [name[1] in "XYZ" and name[1] != name[2] and not rotary[name[2]] for name in self.series]
-        return np.flatnonzero(straight)
+        linear = {axis.name for axis in self.machine.axes if not axis.rotary}
+        names = [(name[:3], name[1] in "XYZ" and name[2] in linear) for name in self.series]
+        return np.flatnonzero([shift and not self.machine.is_positioning(name) for name, shift in names])
 
     def _columns(self, effect: Effect) -> Array:
         """What the coefficients of one effect change in each row: (n, k)."""

@@ -105,10 +105,10 @@ def of_bodies(measurement: Measurement, machine: Machine) -> Measurement:
     Raises `ConfigError` NCF618 of an axis that is slanted against its error axis.
     """
     factor = np.ones(len(measurement))
-    for axis, rows in _positioned(measurement, machine):
-        along = _along(axis)
+    for axis, component, rows in _positioned(measurement, machine):
+        along = axis.reach(component)
         if abs(along) < 1 - SLANTED:
-            text = f"{axis.name} does not move along its error axis: what it is off is no E{axis.name}{axis.name} alone"
+            text = f"{axis.name} does not move along its error axis: what it is off is no E{component}{axis.name} alone"
             raise ConfigError.of("NCF618", text, Place(measurement.path), "give the errors as kind axis")
         factor[rows] = np.sign(along)
     return measurement.with_columns({"value": factor * measurement.columns["value"]})
@@ -116,26 +116,21 @@ def of_bodies(measurement: Measurement, machine: Machine) -> Measurement:
 
 def backwards(measurement: Measurement, machine: Machine, code: str, hint: str) -> Iterator[Message]:
     """A word on positioning of axes whose bodies go against their numbers: nobody says how a table counts."""
-    for axis, rows in _positioned(measurement, machine):
-        if _along(axis) < 0:
-            own = f"E{axis.name}{axis.name}"
+    for axis, component, rows in _positioned(measurement, machine):
+        if axis.reach(component) < 0:
+            own = f"E{component}{axis.name}"
             text = f"{own} is taken along the base axis, against which {axis.name} moves as its number grows"
             yield Message(code, text, measurement.place(rows[0]), hint)
 
 
-def _positioned(measurement: Measurement, machine: Machine) -> Iterator[tuple[Axis, list[int]]]:
-    """The axes X Y Z A B C whose positioning was read, with the rows of that."""
-    pairs = list(zip(measurement.labels["axis"], measurement.labels["component"], strict=True))
+def _positioned(measurement: Measurement, machine: Machine) -> Iterator[tuple[Axis, str, list[int]]]:
+    """The axes whose positioning was read, with its component and the rows of that."""
+    read = list(map(component_of, measurement.labels["axis"], measurement.labels["component"]))
     for axis in machine.axes:
-        own = f"E{axis.name}{axis.name}"
-        rows = [row for row, pair in enumerate(pairs) if pair[0] == axis.name and component_of(*pair) == own]
-        if rows and axis.name in COMPONENTS and axis.rotary == (axis.name not in LINEAR):
-            yield axis, rows
-
-
-def _along(axis: Axis) -> float:
-    """The part of its motion that is along the error axis of its own positioning error."""
-    return float(np.asarray(axis.error_axes[COMPONENTS.index(axis.name) % 3]) @ np.asarray(axis.direction))
+        for component in filter(axis.owns, COMPONENTS):
+            rows = [row for row, name in enumerate(read) if name == f"E{component}{axis.name}"]
+            if rows:
+                yield axis, component, rows
 
 
 def _by_plugin(text: str, path: str) -> Measurement | None:

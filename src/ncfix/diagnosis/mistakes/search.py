@@ -81,7 +81,7 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
         aliases=(*dict.fromkeys(each.name for each in near if each.name != found.name), *found.aliases),
         sure=found.odds > NAMES_COST and (found.gained is not None or _reaches_noise(found, now)),
         torn=torn,
-        remedy=f"{TORN}{_sense(measurements)}" if torn else found.remedy,
+        remedy=f"{TORN}{_sense(measurements, machine)}" if torn else found.remedy,
     )
 
 
@@ -123,14 +123,14 @@ def _simplest(alike: Sequence[Mistake], others: Sequence[Mistake]) -> Mistake:
     return simplest
 
 
-def _sense(measurements: Sequence[Measurement]) -> str:
+def _sense(measurements: Sequence[Measurement], machine: Machine) -> str:
     """How the sign of a laser's deviations is meant, where some were given."""
     read = {
         component
         for each in measurements
         if each.kind == "axis"
         for axis, name in zip(each.labels["axis"], each.labels["component"], strict=True)
-        if (component := component_of(axis, name)) and component[1] == component[2]
+        if (component := component_of(axis, name)) and machine.is_positioning(component)
     }
     if not read:
         return ""
