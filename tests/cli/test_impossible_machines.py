@@ -105,6 +105,21 @@ def test_a_machine_whose_travels_may_be_in_inches_is_remarked_on() -> None:
     assert found.message.hint == "is it in inches, 508 mm? `range` is in mm"
 
 
+def test_a_machine_that_is_left_handed_is_remarked_on() -> None:
+    """The sign of one slide is all it takes."""
+    for right, left in (
+        ("[1, 0, 0]", "[-1, 0, 0]"),
+        ("[0, 1, 0]", "[0, -1, 0]"),
+        ("[0, 0, 1], range", "[0, 0, -1], range"),
+    ):
+        (found,) = doubts(loads(changed(right, left)), "m.toml")
+        assert (found.message.code, found.impossible) == ("NCF325", False)
+    below = FIVE.replace("w C A F X Y Z t", "w C A X F Y Z t")
+    assert [each.message.code for each in doubts(loads(below), "m.toml")] == ["NCF325"]
+    assert doubts(loads(below.replace("[1, 0, 0]", "[-1, 0, 0]", 1)), "m.toml") == []
+    assert doubts(loads(FIVE), "m.toml") == []
+
+
 @pytest.mark.parametrize("what", IMPOSSIBLE)
 def test_a_machine_that_cannot_be_gives_nothing(shop: Any, ncfix: Any, what: str) -> None:
     text, code, said = IMPOSSIBLE[what]

@@ -129,6 +129,15 @@ CODES = {
         "of it, or look like radians or inches. They are in mm or degrees, after `center` and `scale`.",
         FORMATS,
     ),
+    "NCF325": Code(
+        "left-handed axes",
+        "Where X, Y and Z grow the tool goes, seen from the workpiece, as thumb, forefinger and middle finger of the "
+        "left hand point. ISO 841 and all controls have them right-handed: planes, the sense of arcs and tilted planes "
+        "rely on it. One of the axes has the wrong sign, and its errors would be corrected the wrong way round. Mostly "
+        "it is an axis below the workpiece: `direction` is how its body moves as the number grows, which is against "
+        "the way of the tool.",
+        "Turn the sign of the `direction` that is wrong.",
+    ),
     "NCF324": Code(
         "a machine like no other",
         "Something about this machine file cannot be, see the messages before this one. Programs and tables for it "

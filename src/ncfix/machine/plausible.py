@@ -72,7 +72,7 @@ class Doubt:
 
 
 def doubts(machine: Machine, path: str, lines: bool = False) -> list[Doubt]:
-    """All that machines do not have or hardly have: NCF320 to NCF323.
+    """All that machines do not have or hardly have: NCF320 to NCF323, NCF325.
 
     path   that of its file
     lines  the file is looked up for where in it things stand
@@ -220,6 +220,9 @@ def sized(value: float, angle: bool) -> str:
 # -- axes --------------------------------------------------------------------------------------------------------------
 
 
+LEFT_HAND = "of an axis below the workpiece `direction` says how its body moves: X' goes [-1, 0, 0]"
+
+
 def _span(machine: Machine) -> Iterator[Fault]:
     """Axes of which one does what others do. U V W and further axes may be parallel to X Y Z."""
     linear = [axis for axis in machine.axes if not axis.rotary and axis.name in "XYZ"]
@@ -232,6 +235,12 @@ def _span(machine: Machine) -> Iterator[Fault]:
         names = " and ".join(axis.name for axis in dependent)
         text = f"{names} do not span {'a plane' if len(dependent) == 2 else 'space'}: one moves as others do"
         yield "NCF321", text, "see their `direction`", True, "axis", dependent[-1].name, "direction"
+    elif len(linear) == 3:
+        toward = {axis.name: np.array(axis.direction) * (-1 if axis.workpiece_side else 1) for axis in linear}
+        if np.linalg.det([toward[name] for name in "XYZ"]) < 0:
+            text = "X, Y and Z are left-handed, as seen from the workpiece: one of them has the wrong sign"
+            below = next((axis.name for axis in linear if axis.workpiece_side), linear[0].name)
+            yield "NCF325", text, LEFT_HAND, False, "axis", below, "direction"
     for first, second in pairwise(machine.axes):
         if not (first.rotary and second.rotary and first.workpiece_side == second.workpiece_side):
             continue
