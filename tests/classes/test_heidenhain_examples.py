@@ -10,7 +10,7 @@ import pytest
 
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
-from ncfix.compensate.following import follow, placed
+from ncfix.compensate.following import follow, with_workpiece
 from ncfix.compensate.plan.kinematics import joints_from_commands
 from ncfix.control.moves import MotionKind, Moves, Rule, Trace
 from ncfix.control.setup_file import load as load_setup
@@ -196,12 +196,13 @@ def test_the_holes_of_the_shipped_program_are_right_down_to_their_bottom(root: P
         moves = follow(read(text, "k.h"), machine, setup).trace.moves
         holes = moves.kind == MotionKind.CYCLE
         lengths = moves.tool_length[holes]
-        return joints_from_commands(placed(machine, setup), moves.end[holes], moves.tcp[holes], lengths), lengths
+        there = with_workpiece(machine, setup)
+        return joints_from_commands(there, moves.end[holes], moves.tcp[holes], lengths), lengths
 
     meant, lengths = bottoms(source)
     done, _ = bottoms(fixed.text)
-    real = placed(machine, setup).actual_tip(done, State(tool_length=lengths))
-    wanted = placed(machine, setup).tip(meant, lengths)
+    real = with_workpiece(machine, setup).actual_tip(done, State(tool_length=lengths))
+    wanted = with_workpiece(machine, setup).tip(meant, lengths)
     assert len(meant) == 4
     assert np.linalg.norm(real - wanted, axis=1).max() < 0.5e-3
 

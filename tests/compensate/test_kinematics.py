@@ -67,7 +67,7 @@ def test_leading_axes_straight_back_finds_what_solving_for_them_does(machine: Ma
     wanted = machine.tip(poses(machine, 7), lengths)
     maps, offset = affine_tip(machine, q, lengths)
     solved = solve(maps, wanted - offset)
-    np.testing.assert_allclose(machine.placed(q, (x, y, z), wanted, lengths), solved, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(machine.xyz_for_tip(q, (x, y, z), wanted, lengths), solved, rtol=0, atol=ROUNDING)
 
 
 def test_the_tip_stays_when_rotary_axes_turn(machine: Machine) -> None:

@@ -76,7 +76,7 @@ def test_axes_led_to_a_point(name: str, root: Path) -> None:
     found = []
     for compiled in (False, True):
         core.use("compiled" if compiled else "plain")
-        found.append(machine.placed(q, axes, poses(machine, 301)[:300, :3], lengths))
+        found.append(machine.xyz_for_tip(q, axes, poses(machine, 301)[:300, :3], lengths))
     assert np.array_equal(*found)
 
 

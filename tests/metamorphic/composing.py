@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from metamorphic.harness import LENGTH, OPTIONS, SETUP, ends
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_flat, fix_program
-from ncfix.compensate.following import kinematics_of, placed, rotary_names
+from ncfix.compensate.following import kinematics_of, rotary_names, with_workpiece
 from ncfix.compensate.plan.kinematics import commands_from_joints
 from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
 from ncfix.control.setup import Setup, Tool
@@ -129,7 +129,7 @@ class Author:
 
     def __init__(self, machine: Machine, dialect: str, *, wild: bool, setup: Setup) -> None:
         self.machine, self.dialect, self.wild, self.setup = machine, dialect, wild, setup
-        self.placed = placed(machine, setup)
+        self.placed = with_workpiece(machine, setup)
         self.tilting = next(axis.name for axis in machine.axes if axis.rotary and axis.name != "C")
         self.letters = "XYZ" + self.tilting + "C"
         self.lines: list[str] = []

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
-from ncfix.compensate.following import kinematics_of, placed, rotary_names
+from ncfix.compensate.following import kinematics_of, rotary_names, with_workpiece
 from ncfix.compensate.plan.kinematics import joints_from_commands
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.control.setup import Setup, Tool
@@ -110,7 +110,7 @@ def ends(moves: Moves, machine: Machine) -> NDArray[np.float64]:
     """Axis positions at the ends of the motions, mm and degrees."""
     rows = np.flatnonzero(moves.kind != MotionKind.DWELL)
     lengths = np.nan_to_num(moves.length_under_tcp[rows])
-    q = joints_from_commands(placed(machine, SETUP), moves.end[rows], moves.tcp[rows], lengths)
+    q = joints_from_commands(with_workpiece(machine, SETUP), moves.end[rows], moves.tcp[rows], lengths)
     return np.where(machine.rotary, np.degrees(q), q)
 
 

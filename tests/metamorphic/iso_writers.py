@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from metamorphic.harness import LENGTH, SETUP, Route, Step
-from ncfix.compensate.following import placed
+from ncfix.compensate.following import with_workpiece
 from ncfix.compensate.plan.kinematics import commands_from_joints
 from ncfix.machine import Machine
 
@@ -136,7 +136,7 @@ def tip_words(path: Route, machine: Machine) -> list[tuple[np.ndarray, Step]]:
     """X Y Z of the tip in the workpiece for each step, program coordinates, mm."""
     q = positions(path, machine)
     on = np.ones(len(q), dtype=bool)
-    commands = commands_from_joints(placed(machine, SETUP), q, on, np.full(len(q), LENGTH))
+    commands = commands_from_joints(with_workpiece(machine, SETUP), q, on, np.full(len(q), LENGTH))
     columns = [list(machine.axis_names).index(letter) for letter in "XYZ"]
     return list(zip(commands[:, columns] - np.array([0.0, 0.0, 60.0]), path, strict=True))
 

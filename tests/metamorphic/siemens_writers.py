@@ -11,7 +11,7 @@ import numpy as np
 
 from metamorphic.harness import LENGTH, SETUP, Route, Step
 from metamorphic.iso_writers import ORIGIN, tip_words, turn, words
-from ncfix.compensate.following import placed
+from ncfix.compensate.following import with_workpiece
 from ncfix.machine import Machine
 
 HEAD = "G710 G17 G40 G90 G94\nT1 D1 M6\nG54\n"
@@ -290,7 +290,7 @@ def direction(machine: Machine, step: Step) -> np.ndarray:
     """The direction of the tool in the workpiece."""
     q = np.zeros(len(machine.axis_names))
     q[list(machine.axis_names).index("A")], q[list(machine.axis_names).index("C")] = np.radians((step.a, step.c))
-    frame = placed(machine, SETUP).nominal(q, LENGTH)
+    frame = with_workpiece(machine, SETUP).nominal(q, LENGTH)
     return np.asarray(frame[:3, :3] @ np.asarray(machine.tool.direction))
 
 

@@ -127,7 +127,7 @@ def map_on_cylinder(control: MacroControl, block: Block, code: int) -> None:
     if block.axes:
         control.suspend("cylinder", "an axis is led round a cylinder (G107), which ncfix does not follow")
     elif control.resume("cylinder"):
-        control.lose(control.machine, AFTER_UNFOLLOWED)
+        control.lose(control.axis_indices, AFTER_UNFOLLOWED)
 
 
 def turned(control: MacroControl) -> bool:

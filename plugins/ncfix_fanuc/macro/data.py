@@ -75,7 +75,7 @@ def setting_error(control: RS274Control, block: Block, code: int) -> None:
     if block.get("P") or block.unknown:
         control.suspend(SETTING_ERRORS[code], SETTING_ERRORS[code])
     elif control.resume(SETTING_ERRORS[code]):
-        control.lose(control.machine, AFTER_UNFOLLOWED)
+        control.lose(control.axis_indices, AFTER_UNFOLLOWED)
 
 
 def made(control: RS274Control, block: Block, code: int) -> None:
@@ -104,7 +104,7 @@ def circular_pocket_here(control: RS274Control, block: Block, code: int) -> None
     if block.axes:
         make_up(control, block, MADE[code])
         return
-    control.builder.rests(mask_of(control.machine))
+    control.builder.rests(mask_of(control.axis_indices))
     circular_pocket(control, block, code)
 
 

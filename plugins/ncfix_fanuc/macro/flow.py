@@ -41,8 +41,8 @@ def ran(control: MacroControl, label: str) -> None:
     control.warn(
         NOT_AT_HAND, TAKEN.format(label=label), "check what it sets, or say where its file is: --subprograms DIR"
     )
-    control.lose(control.machine, AFTER.format(label=label))
-    control.places.lose(mask_of(control.machine))
+    control.lose(control.axis_indices, AFTER.format(label=label))
+    control.places.lose(mask_of(control.axis_indices))
     control.modal.motion, control.modal.feed, control.modal.cycle.initial = NO_MOTION, math.nan, None
     control.outside = label
 

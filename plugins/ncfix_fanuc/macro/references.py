@@ -35,7 +35,7 @@ def named(control: RS274Control, block: Block, code: int) -> None:
     if block.axes:
         go_to_reference(control, block, code)
         return
-    unknown = control.unknown | dict.fromkeys(control.machine, AFTER_ALL)
+    unknown = control.unknown | dict.fromkeys(control.axis_indices, AFTER_ALL)
     passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format("G28"))
     end = MotionEnd(control.position[:], unknown)
     control.make(Motion(MotionKind.RAPID, 0, end, control.modal.motion, passing=passing))
@@ -59,7 +59,7 @@ def further(control: RS274Control, block: Block, code: int) -> None:
     passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(f"G30 P{number}"))
     if goes_by_way(control, block):
         control.make(Motion(MotionKind.RAPID, block.axes, way, control.modal.motion, passing=passing))
-    taken = [index for index in control.machine if block.axes >> index & 1 or not block.axes]
+    taken = [index for index in control.axis_indices if block.axes >> index & 1 or not block.axes]
     unknown = control.unknown | dict.fromkeys(taken, AFTER_REFERENCE)
     end = MotionEnd(control.position[:], unknown)
     control.make(Motion(MotionKind.RAPID, block.axes, end, control.modal.motion, passing=passing))

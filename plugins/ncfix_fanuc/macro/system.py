@@ -39,7 +39,7 @@ SYSTEM_CODES = {1: 54, 2: 55, 3: 56, 4: 57, 5: 58, 6: 59, 0: 54.1}
 def positions(control: MacroControl) -> dict[int, Getter]:
     """End of the block before (5001), machine position (5021), present position (5041), by axis of the machine."""
     found: dict[int, Getter] = {}
-    for place, index in enumerate(sorted(control.machine)):
+    for place, index in enumerate(sorted(control.axis_indices)):
         found[5001 + place] = found[5041 + place] = partial(control.coordinate, index)
         found[5021 + place] = partial(machine_position, control, index)
     return found

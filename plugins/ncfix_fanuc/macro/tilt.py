@@ -272,7 +272,7 @@ def align(control: MacroControl, block: Block, code: int) -> None:
         lost |= {*control.turning}
     if hidden or (code == ABOUT_TIP and is_moved_otherwise(control, block)):
         lost |= {X, Y, Z}
-    unknown = control.unknown | dict.fromkeys(lost.intersection(control.machine), why)
+    unknown = control.unknown | dict.fromkeys(lost.intersection(control.axis_indices), why)
     control.make(
         Motion(MotionKind.RAPID, 0, MotionEnd(target, unknown), control.modal.motion, passing=ALIGNMENTS[code])
     )
@@ -284,10 +284,10 @@ def turned(control: MacroControl, angles: Mapping[int, float], *, about_tip: boo
         return [angles.get(index, value) for index, value in enumerate(control.position)]
     assert control.kinematics is not None, "they have shown how the tool is pointed"
     on, off = TcpState(True, control.length_under_tcp), TcpState(False, 0.0)
-    still = control.kinematics([control.position[index] for index in control.machine], on, off)
-    command = [angles.get(index, value) for index, value in zip(control.machine, still, strict=True)]
+    still = control.kinematics([control.position[index] for index in control.axis_indices], on, off)
+    command = [angles.get(index, value) for index, value in zip(control.axis_indices, still, strict=True)]
     target = control.position[:]
-    for index, value in zip(control.machine, control.kinematics(command, off, on), strict=True):
+    for index, value in zip(control.axis_indices, control.kinematics(command, off, on), strict=True):
         target[index] = value
     return target
 

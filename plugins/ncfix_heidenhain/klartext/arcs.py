@@ -218,7 +218,7 @@ def give_up(control: KlartextControl, step: Step, where: FramePosition) -> bool:
     reason = reasons[0] if reasons else "a word of the arc depends on a Q parameter that is known only at run time"
     if step.words.unknown:
         axes = step.words.axes or 3
-        where.unknown |= {i: reason for i in control.machine if axes >> i & 1}
+        where.unknown |= {i: reason for i in control.axis_indices if axes >> i & 1}
     do_without(control, step, where, reason)
     return True
 

@@ -138,7 +138,7 @@ class KlartextControl(base.ProgramControl):
         """Make a preset of the setup the active one; what is not given counts as zero, and is asked for when used."""
         given = self.setup.work_offsets.get(name)
         self.preset_checked = given is not None
-        self.places.shift(mask_of(self.machine))
+        self.places.shift(mask_of(self.axis_indices))
         turning = {letter: self.rotary[INDEX[letter]] for letter in given or {}}
         datum = shifted({INDEX[a]: value * (DEGREE if turning[a] else 1.0) for a, value in (given or {}).items()})
         self.frames = replace(self.frames, name=name, datum=datum)
@@ -249,6 +249,6 @@ class KlartextControl(base.ProgramControl):
     def pass_here(self, passing: Passing, lost: str, letters: str) -> None:
         """A motion of the control's own; these axes are not known afterwards."""
         unknown = dict(self.unknown)
-        unknown |= {INDEX[letter]: lost for letter in letters if INDEX[letter] in self.machine}
+        unknown |= {INDEX[letter]: lost for letter in letters if INDEX[letter] in self.axis_indices}
         super().make(Motion(MotionKind.RAPID, 0, MotionEnd(self.position[:], unknown), 0, passing=passing))
         self.path.tangent = None

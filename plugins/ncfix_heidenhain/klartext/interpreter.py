@@ -148,7 +148,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
 
     def __init__(self, control: KlartextControl, program: Program, run: Run, *, in_parts: bool = False) -> None:
         super().__init__(control, program, run, in_parts=in_parts)
-        self.axes = mask_of(control.machine)
+        self.axes = mask_of(control.axis_indices)
         self.comma: bool | None = None
         self.shapes = 0
         self.polar: list[int] = []
@@ -319,7 +319,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         for letter in step.words.letters:
             if control.path.spatial and letter in "ABC":
                 continue
-            if INDEX[letter] not in control.machine and letter not in control.foreign:
+            if INDEX[letter] not in control.axis_indices and letter not in control.foreign:
                 self.span = plan.spans.get(letter) or plan.spans.get("I" + letter)
                 control.note_foreign(letter)
                 self.span = None

@@ -122,7 +122,7 @@ def count_on_one_turn(control: KlartextControl, stage: KlartextBlockRows) -> int
     if not control.shortest:
         return len(stage.feed)
     turns = np.zeros(len(stage.feed), dtype=np.bool_)
-    for index in control.machine:
+    for index in control.axis_indices:
         if control.rotary[index]:
             turns |= np.rint(np.diff(stage.path[:, index]) / (2 * math.pi)) != 0
     return int(np.argmax(turns)) if turns.any() else len(turns)

@@ -73,7 +73,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
         lead=layout.prefix.stop,
         opening="L",
         closing=layout.closing and layout.blank + layout.closing,
-        turns_named=True,
+        only_named_rotary=True,
         arc=ArcLayout({}, alone=True) if layout.name in ARCS else None,
     )
 

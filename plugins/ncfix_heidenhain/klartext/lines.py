@@ -120,7 +120,7 @@ def turns(control: KlartextControl, indices: Sequence[int], end: MotionEnd) -> b
 
 def keep_tangent(control: KlartextControl, start: Vector, unknown: UnknownAxes) -> None:
     """Note in which direction a straight motion went; one without a way leaves the direction as it was."""
-    if any(index in unknown or index in control.unknown for index in range(3) if index in control.machine):
+    if any(index in unknown or index in control.unknown for index in range(3) if index in control.axis_indices):
         control.path.tangent = None
         return
     way = [b - a for a, b in zip(start[:3], control.position[:3], strict=True)]
@@ -134,7 +134,7 @@ def take_short_way(control: KlartextControl, step: Step, target: Vector, axes: i
 
     Returns why the motion is refused: of increments of more than half a turn the manuals do not say what it makes.
     """
-    for index in control.machine:
+    for index in control.axis_indices:
         if not (control.rotary[index] and axes >> index & 1) or index in control.unknown:
             continue
         if "I" + LETTERS[index] in step.words.values and abs(target[index] - control.position[index]) > math.pi:
@@ -146,7 +146,7 @@ def take_short_way(control: KlartextControl, step: Step, target: Vector, axes: i
 
 def turn_under_tilt(control: KlartextControl, step: Step, end: MotionEnd, axes: int) -> None:
     """Rotary axes that move in a tilted plane without M128: X Y Z of the machine stand still, the tip does not."""
-    target, still = end.target, [index for index in control.machine if not control.rotary[index]]
+    target, still = end.target, [index for index in control.axis_indices if not control.rotary[index]]
     linear = any(axes >> index & 1 for index in range(len(target)) if not control.rotary[index])
     switch(control, control.tools.vector, False, control.tools.offset)
     control.refresh()
@@ -173,7 +173,7 @@ def at_machine(control: KlartextControl, step: Step) -> None:
         for index in axes.keys() - unsure.keys():
             axes[index] += zero[LETTERS[index]] * (DEGREE if control.rotary[index] else 1.0)
     if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():
-        elsewhere = dict.fromkeys((i for i in control.machine if not control.rotary[i]), NOT_STRAIGHT)
+        elsewhere = dict.fromkeys((i for i in control.axis_indices if not control.rotary[i]), NOT_STRAIGHT)
         axes, unsure = dict.fromkeys(elsewhere, 0.0) | axes, unsure | elsewhere
     end = led_in_machine(control, axes, unsure)
     passing = Passing(Pass.MACHINE_COORDINATES, MACHINE_COORDINATES.format(code))
@@ -210,7 +210,7 @@ def departure(control: KlartextControl, step: Step) -> None:
         return
     tangent, control.path.tangent = control.path.tangent, None
     plane = control.path.plane
-    lost: UnknownAxes = {i: DEPARTED for i in plane.pair if i in control.machine}
+    lost: UnknownAxes = {i: DEPARTED for i in plane.pair if i in control.axis_indices}
     target = control.position[:]
     straight_on = step.name == "dep lt" and "LEN" in step.words.values and not (beside or step.words.unknown)
     if straight_on and tangent is not None:

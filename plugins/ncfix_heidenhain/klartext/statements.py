@@ -147,7 +147,7 @@ def end_of_short_ways(control: KlartextControl) -> None:
     M126 means nothing to an axis that cannot go round, as the one that tilts the tool: it may stand below zero.
     """
     pointing = control.posture.pointing if control.shortest else None
-    tilts = None if pointing is None else control.machine[pointing.columns[1]]
+    tilts = None if pointing is None else control.axis_indices[pointing.columns[1]]
     for index in control.turning if control.shortest else ():
         below = control.position[index] < 0 and index != tilts
         if index not in control.unknown and (below or control.position[index] >= TURN):
@@ -233,7 +233,7 @@ def call_tool(
         control.tools.select(int(tool))
         control.tools.change()
     if tool is not None:
-        control.places.lose(mask_of(control.machine))
+        control.places.lose(mask_of(control.axis_indices))
     control.tool_called = True
     control.tools.offset = control.tools.spindle
     tell_radius(control, words.values.get("DR", 0.0))

@@ -82,7 +82,7 @@ def programmed_position(control: KlartextControl, words: MotionWords) -> FramePo
     """The position to which the words of axes lead."""
     if words.incremental:
         counted = [INDEX[address[1:]] for address in words.values if address[0] == "I" and address[1:] in INDEX]
-        control.use_start_positions(list(control.machine) if control.is_rotated else counted)
+        control.use_start_positions(list(control.axis_indices) if control.is_rotated else counted)
     where = here(control)
     for address, value in words.values.items():
         letter = address.removeprefix("I")
@@ -115,7 +115,7 @@ def derived(control: KlartextControl, words: MotionWords, axes: int) -> str:
         own |= polar_axes(control, words)
     if words.values.keys() & {"TX", "TY", "TZ"}:
         own |= mask_of(control.turning)
-    index = next((i for i in control.machine if (axes & ~own & control.places.unplaced) >> i & 1), None)
+    index = next((i for i in control.axis_indices if (axes & ~own & control.places.unplaced) >> i & 1), None)
     return "" if index is None else UNPLACED.format(LETTERS[index])
 
 
@@ -229,4 +229,4 @@ def polar_axes(control: KlartextControl, words: MotionWords) -> int:
 def starts_unknown(control: KlartextControl) -> bool:
     """Where the motion begins is not known in X Y Z."""
     control.use_start_positions([index for index, why in control.unknown.items() if why is AT_START])
-    return any(index in control.unknown for index in (X, Y, Z) if index in control.machine)
+    return any(index in control.unknown for index in (X, Y, Z) if index in control.axis_indices)

@@ -490,7 +490,7 @@ def cycle_19(control: KlartextControl, words: MotionWords) -> None:
         return
     meant = by_angles({f"SP{letter}": value for letter, value in values.items()})
     standing = all(
-        INDEX[letter] in control.machine
+        INDEX[letter] in control.axis_indices
         and INDEX[letter] not in control.unknown
         and abs(control.position[INDEX[letter]] - value * DEGREE) < 1e-6
         for letter, value in values.items()
@@ -499,7 +499,7 @@ def cycle_19(control: KlartextControl, words: MotionWords) -> None:
     if square is False and standing:
         by_axes(control, values, frozenset())
         return
-    if not square and all(INDEX[letter] in control.machine for letter in values):
+    if not square and all(INDEX[letter] in control.axis_indices for letter in values):
         other = plane_of(control, values)
         if other is not None and math.dist(normal_of(other), normal_of(meant)) > 1e-6:
             control.warn(ANGLES, "cycle 19 is taken to name spatial angles, not positions of rotary axes", ANGLES_HINT)

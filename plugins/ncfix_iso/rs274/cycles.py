@@ -177,5 +177,5 @@ def hole_unknown(control: RS274Control, block: Block) -> UnknownAxes:
         unknown |= unnamed(control, block)
     if control.is_rotated and unknown.keys() & {0, 1, 2}:
         reason = unknown[min(unknown)]
-        unknown |= {index: reason for index in (0, 1, 2) if index in control.machine}
+        unknown |= {index: reason for index in (0, 1, 2) if index in control.axis_indices}
     return unknown

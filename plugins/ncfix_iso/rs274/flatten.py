@@ -133,7 +133,7 @@ class RS274Flattener(Flattener):
     def must_stand(self, axes: int) -> None:
         """Raise `Fault` where absolute words would have to say where an axis stands, and the program has not."""
         unplaced = self.control.places.unplaced & axes
-        index = next((index for index in self.control.machine if unplaced >> index & 1), None)
+        index = next((index for index in self.control.axis_indices if unplaced >> index & 1), None)
         if index is not None:
             what = f"the program has not said where the axis {LETTERS[index]} stands"
             raise Fault(RUNTIME, f"{what}, so it cannot be written out flat")

@@ -91,7 +91,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
 
     def __init__(self, control: RS274Control, program: Program, run: Run, *, in_parts: bool = False) -> None:
         super().__init__(control, program, run, in_parts=in_parts)
-        self.axes = mask_of(control.machine)
+        self.axes = mask_of(control.axis_indices)
         control.set_length = control.rules.steps.get(LENGTH_CODE, tool_offset)
         self.main = RS274Unit(program, control.rules, self.axes)
         self.flow = self.prepared()
@@ -306,7 +306,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         """Note axes that the program moves and the machine lacks."""
         control = self.control
         for index, letter in enumerate(LETTERS):
-            if plan.axes >> index & 1 and index not in control.machine and letter not in control.foreign:
+            if plan.axes >> index & 1 and index not in control.axis_indices and letter not in control.foreign:
                 self.span = plan.span_of(letter)
                 lathe = letter in "UVW" and not control.rules.strict
                 control.note_foreign(letter, INCREMENTS if lathe else "")
@@ -323,7 +323,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         """A command to Grbl itself: homing and jogging move the machine, and what is none of its may do anything."""
         text = self.flow.unit.program.slice(self.flow.block - 1, span).upper().replace(" ", "")
         if text.startswith(("$H", "$J=")):
-            self.control.lose(self.control.machine, MACHINE_MOVED)
+            self.control.lose(self.control.axis_indices, MACHINE_MOVED)
         elif not HARMLESS_COMMAND.match(text):
             self.note_unknown(span)
 

@@ -38,7 +38,7 @@ def unnamed(control: RS274Control, block: Block) -> UnknownAxes:
         doubtful = doubtful if named < control.unnamed else frozenset()
     if doubtful or not control.modal.incremental:
         control.unnamed = frozenset()
-    return dict.fromkeys(sorted(doubtful & {*control.machine}), AFTER_ROTATION)
+    return dict.fromkeys(sorted(doubtful & {*control.axis_indices}), AFTER_ROTATION)
 
 
 def words_destination(control: RS274Control, block: Block) -> MotionEnd:
@@ -68,7 +68,7 @@ def unknown_after(control: RS274Control, block: Block, incremental: bool, before
         return before
     unknown = dict(before)
     for index, letter in enumerate(LETTERS):
-        if not block.axes >> index & 1 or index not in control.machine:
+        if not block.axes >> index & 1 or index not in control.axis_indices:
             continue
         if not incremental:
             unknown.pop(index, None)
@@ -263,7 +263,7 @@ def go_to_reference(control: RS274Control, block: Block, code: int) -> None:
     control.offset_checked = checked
     if goes_by_way(control, block):
         control.make(Motion(MotionKind.RAPID, block.axes, way, modal, passing=passing))
-    axes = block.axes or mask_of(control.machine)
+    axes = block.axes or mask_of(control.axis_indices)
     end = reference_target(control, name, axes)
     control.make(Motion(MotionKind.RAPID, block.axes, end, modal, passing=passing))
 
@@ -278,7 +278,7 @@ def reference_target(control: RS274Control, name: str, axes: int) -> MotionEnd:
     """Where the reference point is, along the axes of the bit mask; elsewhere the position."""
     first = REFERENCES[name]
     place, unsure = along(control, stored(control, first), axes), dict(control.unknown)
-    for index in control.machine:
+    for index in control.axis_indices:
         if axes >> index & 1:
             unsure.pop(index, None)
             given = is_given(control, first, index) and not control.parameters.is_unknown(first + index)
@@ -335,7 +335,7 @@ def probe(control: RS274Control, block: Block, code: int) -> None:
         raise Fault(BAD_MOTION, "the probe starts at the end of its motion")
     spatial = 7 if control.is_rotated and block.axes & 7 else 0
     named = [index for index in moved if (block.axes | spatial) >> index & 1]
-    touched = MotionEnd(target, unknown | {index: AFTER_PROBING for index in named if index in control.machine})
+    touched = MotionEnd(target, unknown | {index: AFTER_PROBING for index in named if index in control.axis_indices})
     probed(control, Motion(MotionKind.FEED, block.axes, touched, code, passing=PROBING), touches=False)
 
 
@@ -391,7 +391,7 @@ def turning_cycle(control: RS274Control, block: Block, code: int) -> None:
     """G70 to G72 of turning: where it goes is written elsewhere in the program."""
     unknown = dict(control.unknown)
     for letter in "XZ":
-        if INDEX[letter] in control.machine:
+        if INDEX[letter] in control.axis_indices:
             unknown[INDEX[letter]] = AFTER_CYCLE
     refusal = f"turning cycle (G{code / 10:g})"
     control.make(Motion(MotionKind.FEED, block.axes, MotionEnd(control.position[:], unknown), code, refusal=refusal))

@@ -161,7 +161,7 @@ def change_tool(control: RS274Control, block: Block, code: int) -> None:
         if control.tools.selected < 0:
             raise Fault(BAD_LENGTH, "M61 needs Q, the number of the tool")
     else:
-        control.places.lose(mask_of(control.machine))
+        control.places.lose(mask_of(control.axis_indices))
     control.tools.change()
 
 

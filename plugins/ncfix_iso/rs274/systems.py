@@ -148,7 +148,7 @@ def is_turned(control: RS274Control) -> bool:
 def turned_back(control: RS274Control) -> None:
     """Coordinates are no longer turned: where the axes stand after an origin that was moved is not known."""
     if not (is_turned(control) or control.tilted) and control.resume(TURNED):
-        control.lose(control.machine, AFTER_TURNED)
+        control.lose(control.axis_indices, AFTER_TURNED)
 
 
 def select_system(control: RS274Control, block: Block, code: int) -> None:
@@ -193,10 +193,10 @@ def compose(control: RS274Control) -> None:
     frames = control.frames
     if not control.probes_nominally:
         is_unknown, first = control.parameters.is_unknown, first_parameter(control.modal.system)
-        unknown = {index for index in control.machine if is_unknown(first + index) or is_unknown(SHIFT + index)}
+        unknown = {index for index in control.axis_indices if is_unknown(first + index) or is_unknown(SHIFT + index)}
         own = frames.local.unknown.keys()
         if frames.datum.rotation is not IDENTITY and ((unknown | own) & {X, Y} or is_unknown(first + 9)):
-            unknown |= {X, Y} & {*control.machine}
+            unknown |= {X, Y} & {*control.axis_indices}
         datum = replace(frames.datum, unknown=dict.fromkeys(sorted(unknown), RUNTIME_OFFSET))
         control.frames = replace(frames, datum=datum)
     control.refresh()
@@ -225,7 +225,7 @@ def check_system(control: RS274Control) -> None:
     control.offset_checked = True
     name = SYSTEM_NAMES[control.modal.system - 1]
     first = first_parameter(control.modal.system)
-    if name not in control.setup.work_offsets and not all(is_given(control, first, i) for i in control.machine):
+    if name not in control.setup.work_offsets and not all(is_given(control, first, i) for i in control.axis_indices):
         control.knowledge.work_offset(name)
 
 
@@ -341,7 +341,7 @@ def take_shift(control: RS274Control, code: int) -> None:
     control.parameters.assign(SHIFT_ACTIVE, float(again))
     compose(control)
     after, doubtful = control.frames.additive.shift, doubtful | {*control.composed.unknown}
-    control.places.shift(mask_of(i for i in control.machine if before[i] != after[i] or i in doubtful))
+    control.places.shift(mask_of(i for i in control.axis_indices if before[i] != after[i] or i in doubtful))
 
 
 def preset_system(control: RS274Control, block: Block, code: int) -> None:
@@ -373,7 +373,7 @@ def set_local(control: RS274Control, block: Block, *, cancelled: bool) -> None:
         local[index] = 0.0 if cancelled else control.scale[index] * block.values[LETTERS[index]]
         unknown.pop(index, None)
         at_run_time = LETTERS[index] in block.unknown and not cancelled and not control.probes_nominally
-        if at_run_time and index in control.machine:
+        if at_run_time and index in control.axis_indices:
             unknown[index] = RUNTIME_OFFSET
     control.frames = replace(control.frames, local=Affine(tuple(local), unknown=unknown))
     compose(control)
@@ -449,4 +449,4 @@ def unfollowed(control: RS274Control, block: Block, code: int) -> None:
         key, words = UNFOLLOWED[code]
         control.suspend(key, f"{words} is in force, which ncfix does not follow")
     elif control.resume(ENDS[code]):
-        control.lose(control.machine, AFTER_UNFOLLOWED)
+        control.lose(control.axis_indices, AFTER_UNFOLLOWED)

@@ -254,7 +254,7 @@ def into_spindle(control: Sinumerik) -> None:
     control.resume("tool")
     control.tools.change()
     control.edge = 1
-    control.places.lose(mask_of(control.machine))
+    control.places.lose(mask_of(control.axis_indices))
 
 
 def take_up(control: Sinumerik) -> None:

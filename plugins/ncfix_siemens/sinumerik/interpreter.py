@@ -340,11 +340,11 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
 def let_axis_go(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None:
     """POS[X]=.. and its like: an axis that moves by itself; where it arrives is not followed."""
     name = step.index[0](control) if step.index else None
-    known = isinstance(name, str) and name in INDEX and INDEX[name] in control.machine
+    known = isinstance(name, str) and name in INDEX and INDEX[name] in control.axis_indices
     if step.name == POLYNOMIAL:
         follow_polynomial(control, turn, step, str(name) if known else None)
         return
-    gone = (INDEX[str(name)],) if known else () if isinstance(name, str) else control.machine
+    gone = (INDEX[str(name)],) if known else () if isinstance(name, str) else control.axis_indices
     if not gone:
         return
     why = ASYNCHRONOUS.get(step.name, "a positioning axis (POS)")
@@ -361,7 +361,7 @@ def follow_polynomial(control: Sinumerik, turn: Turn, step: AssignedVariable, le
     first = next(iter(step.listed), step.value)
     value = first(control) if first is not None and letter is not None else None
     letters = LETTERS if letter is None else letter
-    axes = [each for each in letters if INDEX[each] in control.machine]
+    axes = [each for each in letters if INDEX[each] in control.axis_indices]
     ends: dict[str, float | None] = dict.fromkeys(axes, None if value is None else number(value))
     words = BlockWordValues(turn.words.block, ends, axes=mask_of(INDEX[each] for each in axes))
     control.go(MotionKind.FEED, words, destination(control, words), MOTIONS["poly"], refusal=POLYNOMIALS)
@@ -438,7 +438,7 @@ def refuse(control: Sinumerik, plan: SinumerikPlan, block: int, why: str) -> Non
     machine = "supa" in plan.names or not MACHINE.isdisjoint(plan.g)
     passing = Passing(Pass.MACHINE_COORDINATES, "machine coordinates") if machine else None
     control.row_block = block
-    lost = dict.fromkeys(control.machine, why)
+    lost = dict.fromkeys(control.axis_indices, why)
     words = BlockWordValues(block, axes=plan.axes)
     control.go(MotionKind.RAPID, words, MotionEnd(control.position[:], lost, dict(lost)), 0, passing=passing)
 

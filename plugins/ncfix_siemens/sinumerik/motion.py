@@ -177,7 +177,8 @@ def to_machine_position(control: Sinumerik, words: BlockWordValues, name: str) -
 def measure(control: Sinumerik, words: BlockWordValues) -> None:
     """MEAS: towards the words until the probe switches."""
     end = destination(control, words)
-    gone = {i: AFTER_MEASURING for i in control.machine if end.target[i] != control.position[i] or i in end.unknown}
+    moved = [i for i in control.axis_indices if end.target[i] != control.position[i] or i in end.unknown]
+    gone = dict.fromkeys(moved, AFTER_MEASURING)
     lost = end.lost | control.along_frame(gone)
     ends = MotionEnd(end.target, end.unknown | gone, lost)
     control.go(MotionKind.FEED, words, ends, control.modal.motion, passing=MEASURING)
@@ -186,9 +187,9 @@ def measure(control: Sinumerik, words: BlockWordValues) -> None:
 def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
     """G74 and G75: the axes named, `X1=0` among them, go to a point that the machine knows."""
     named = [INDEX[address[0]] for address in words.values if address[:1] in INDEX]
-    gone = tuple(index for index in dict.fromkeys(named) if index in control.machine)
+    gone = tuple(index for index in dict.fromkeys(named) if index in control.axis_indices)
     reasons = dict.fromkeys((*gone, *(GEOMETRY if gone and control.tcp else ())), AFTER_REFERENCE)
-    reasons = {index: why for index, why in reasons.items() if index in control.machine}
+    reasons = {index: why for index, why in reasons.items() if index in control.axis_indices}
     lost = control.lost_in_frame() | control.along_frame(reasons)
     words = BlockWordValues(words.block, axes=mask_of(gone))
     end = MotionEnd(control.position[:], dict(control.unknown) | reasons, lost)

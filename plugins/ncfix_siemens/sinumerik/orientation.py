@@ -131,7 +131,7 @@ def by_direction(control: Sinumerik, words: BlockWordValues) -> str:
         return WHICH_ANGLES
     control.use_all_start_positions()
     if control.unknown.keys() & {*control.turning}:
-        return FROM_UNKNOWN.format(LETTERS[control.machine[control.posture.pointing.columns[0]]])
+        return FROM_UNKNOWN.format(LETTERS[control.axis_indices[control.posture.pointing.columns[0]]])
     size = math.hypot(*wanted)
     if size < NO_LENGTH:
         raise Fault(BAD_VECTOR, "the direction of the tool (A3 B3 C3) has no length")
@@ -181,7 +181,7 @@ def run_vectors(control: Sinumerik, unit: SinumerikUnit, block: int, main: bool)
         return 0
     pointing = control.posture.pointing
     assert pointing is not None
-    letters = [control.machine[column] for column in pointing.columns]
+    letters = [control.axis_indices[column] for column in pointing.columns]
     turning = 1 << letters[0] | 1 << letters[1]
     mask = unit.lanes.mask[unit.program.template[block:stop]] | turning
     stop = before_placing(control, mask, block)
@@ -334,7 +334,7 @@ def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
     for index, angle in axes.items():
         target[index] = angle
         unknown.pop(index, None)
-    gone = [index for index in control.machine if (control.rotary[index] and index not in axes) or index in (X, Y, Z)]
+    gone = [i for i in control.axis_indices if (control.rotary[i] and i not in axes) or i in (X, Y, Z)]
     lost = dict(control.lost_in_frame()) | dict.fromkeys(gone, AFTER_SWIVEL)
     lost = {index: why for index, why in lost.items() if index not in axes}
     mask = mask_of(control.turning)
@@ -369,7 +369,7 @@ def turn_square(control: Sinumerik, plane: SwivelPlane) -> dict[int, float]:
     """
     if control.posture.pointing is None:
         return {}
-    outer, inner = (control.machine[column] for column in control.posture.pointing.columns)
+    outer, inner = (control.axis_indices[column] for column in control.posture.pointing.columns)
     here = [0.0 if index in control.unknown else control.position[index] for index in (outer, inner)]
     rules = WayRules(in_travel=True, sense=plane.direction)
     found = control.postures(normal_of(control.rotation), rules, (here[0], here[1]))

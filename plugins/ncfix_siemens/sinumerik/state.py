@@ -207,7 +207,7 @@ class Sinumerik(ProgramControl):
         Nor is the motion code known to be what it was.
         """
         self.stated = False
-        self.lose(self.machine, reason)
+        self.lose(self.axis_indices, reason)
 
     def path_word(self, words: Collection[str]) -> str:
         """See `PATH_WORDS`; I J K are words of arcs, and lead nowhere beside a straight motion."""

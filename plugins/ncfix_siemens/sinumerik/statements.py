@@ -475,7 +475,7 @@ def strangers(control: Sinumerik, words: BlockWordValues) -> None:
         extended = len(address) > 1 and address[0] in "XYZABCUVWQ" and address[1:].isdigit()
         if address in PATH_WORDS and address not in INDEX:
             continue
-        lacking = address in INDEX and INDEX[address] not in control.machine
+        lacking = address in INDEX and INDEX[address] not in control.axis_indices
         if (lacking or extended) and address not in control.foreign:
             control.note_foreign(address)
 

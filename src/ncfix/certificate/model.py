@@ -62,7 +62,7 @@ class TipModel:
         """Axis positions for commands (n, n_axes), those under tool-centre-point control included."""
         q = command.copy()
         if tcp.any():
-            found = self.machine.placed(command[tcp], self.columns, self._at_zero(command[tcp]), length[tcp])
+            found = self.machine.xyz_for_tip(command[tcp], self.columns, self._at_zero(command[tcp]), length[tcp])
             q[np.flatnonzero(tcp)[:, None], list(self.columns)] = found
         return q
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ncfix.compensate.driver import Fixed, fix_flat, fix_program
-from ncfix.compensate.following import placed
+from ncfix.compensate.following import with_workpiece
 from ncfix.compensate.plan.arrays import Array, Index, picked
 from ncfix.compensate.plan.kinematics import reached_joints, signs
 from ncfix.machine import Machine, State
@@ -82,7 +82,7 @@ class Changes:
         """Correct a program, and keep how; raises what `fix_program` does."""
         fix = fix_flat if options.flatten else fix_program
         fixed = fix(program, machine, setup, options, resolve)
-        return cls(fixed, machine if fixed.made is None else placed(machine, setup))
+        return cls(fixed, machine if fixed.made is None else with_workpiece(machine, setup))
 
     def unified(self, original: bytes, before: str, after: str) -> Iterator[bytes]:
         """The lines of a unified diff of the text that was given; nothing if nothing changes."""

@@ -15,7 +15,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.account import said_of
 from ncfix.compensate.block_delete import SwitchSetting, messages_of, positions_of
 from ncfix.compensate.driver import PartCorrector, fix_flat, fix_program
-from ncfix.compensate.following import Resolve, Task, follow, placed, suspected
+from ncfix.compensate.following import Resolve, Task, follow, suspected, with_workpiece
 from ncfix.compensate.parts import MachineParts, Part, Parts
 from ncfix.compensate.plan.findings import Notes
 from ncfix.compensate.plan.intent import Intent
@@ -70,7 +70,7 @@ def check_on(
     positions = positions_of(setup, lambda own: follow(program, machine, own, resolve).trace)
     fix = fix_flat if flatten else fix_program
     report = None if machine.is_perfect else fix(program, machine, setup, OPTIONS, resolve).report
-    return _checked(program, positions, Survey(placed(machine, setup)), report)
+    return _checked(program, positions, Survey(with_workpiece(machine, setup)), report)
 
 
 def survey_alone(parts: Parts, found: Iterable[Part]) -> Checked:
@@ -85,7 +85,7 @@ def survey_on(task: Task, read: Read) -> Checked:
     """As `check_on`, of the text that is read; raises what correcting does, and `NotInPartsError`."""
     if task.machine.is_perfect:
         parts = MachineParts.of(task, read)
-        survey = Survey(parts.placed)
+        survey = Survey(parts.set_up)
         parts.look = survey.look
         for _ in parts:
             pass

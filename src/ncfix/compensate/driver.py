@@ -38,7 +38,6 @@ from ncfix.compensate.following import (
     Resolve,
     Task,
     kinematics_of,
-    placed,
     refuse_stamped,
     resolving,
     rotary_names,
@@ -46,6 +45,7 @@ from ncfix.compensate.following import (
     suspected,
     traced,
     with_tool_lengths,
+    with_workpiece,
 )
 from ncfix.compensate.parts import ContinuedPart, MachineParts, PartProof
 from ncfix.compensate.plain import PlainPlan, Planner
@@ -73,8 +73,8 @@ from ncfix.writer.language import WrittenLanguage
 
 ASTRAY = 1.0
 """mm; no correction and no remainder of one is so large."""
-HESITATIONS = 4
-"""Attempts that may correct what an earlier one refused; later ones may not, so that they come to an end."""
+FREE_ATTEMPTS = 4
+"""After so many attempts what one of them has refused stays refused, so that they come to an end."""
 
 
 class Proof(Protocol):
@@ -107,7 +107,7 @@ class ProvedPart:
     tally: Tally
     next_line: int
 
-    def placed(self, file: int, at: int) -> ProvedPart:
+    def written_into(self, file: int, at: int) -> ProvedPart:
         """Put the text into a file, from a byte on; the part without it."""
         assert isinstance(self.text, bytes)
         put_at(file, at, self.text)
@@ -169,7 +169,7 @@ class Corrector:
                 part.program, moves, self.machine, task.options, readings, before, accepted, refused
             )
             tries += 1
-            if tries > HESITATIONS:
+            if tries > FREE_ATTEMPTS:
                 refused, accepted = {b: why for each in joint.plans for b, why in each.reasons.items()}, None
             solution = joint.plans[0]
             if before is not None and (solution.reaches_back or solution.unchanged[0] != before.unchanged):
@@ -280,7 +280,7 @@ def fix_program(
     positions = positions_of(setup, lambda own: with_tool_lengths(program, follow(program, own), machine, own))
     moves, words = [each.trace.moves for each in positions], (stamped(positions), assumed_of(positions))
     proof = WholeProof(program, [partial(follow, own=each.setup) for each in positions])
-    there = placed(resolving(machine, program.dialect, program.source), setup)
+    there = with_workpiece(resolving(machine, program.dialect, program.source), setup)
     corrector = Corrector(task, there, proof, lambda: words)
     done = corrector.correct(ContinuedPart.whole(program, moves[0], corrector.machine), moves)
     tally, text, joint = done.tally, done.text, corrector.joint
@@ -336,7 +336,7 @@ class PartCorrector(Corrector):
     def __init__(self, task: Task, read: Read) -> None:
         self.parts = parts = MachineParts.of(task, read)
         self.parts_proof = PartProof(task, parts.reader)
-        super().__init__(task, parts.placed, self.parts_proof, lambda: ("", parts.assumed))
+        super().__init__(task, parts.set_up, self.parts_proof, lambda: ("", parts.assumed))
         self.planner, self.language = Planner.of(self.machine, task.options), language_of(task.dialect, WrittenLanguage)
 
     def work(self, share: WorkShare) -> Iterator[tuple[int, ProvedPart]]:

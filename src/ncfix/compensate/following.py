@@ -62,7 +62,7 @@ def follow(program: Program, machine: Machine, setup: Setup, resolve: Resolve | 
     tools, where the errors of the machine depend on them.
     """
     found = traced(program, machine, setup, resolve)
-    return Followed(placed(machine, setup), with_tool_lengths(program, found, machine, setup))
+    return Followed(with_workpiece(machine, setup), with_tool_lengths(program, found, machine, setup))
 
 
 def traced(program: Program, machine: Machine, setup: Setup, resolve: Resolve | None = None) -> Trace:
@@ -95,7 +95,7 @@ def kinematics_of(machine: Machine) -> Kinematics | None:
     return Positions(machine) if {"X", "Y", "Z"} <= set(machine.axis_names) else None
 
 
-def placed(machine: Machine, setup: Setup) -> Machine:
+def with_workpiece(machine: Machine, setup: Setup) -> Machine:
     """The machine with the workpiece where the setup has it, under the conditions that the setup gives."""
     x, y, z = (a + b for a, b in zip(machine.workpiece_offset, setup.workpiece_offset, strict=True))
     return machine.replace(workpiece_offset=(x, y, z), conditions=dict(setup.inputs))

@@ -14,7 +14,7 @@ import numpy as np
 from ncfix import core
 from ncfix.compensate import FixOptions
 from ncfix.compensate.block_delete import JointPlan, Readings
-from ncfix.compensate.following import Task, placed, refuse_stamped, resolving, with_tool_lengths
+from ncfix.compensate.following import Task, refuse_stamped, resolving, with_tool_lengths, with_workpiece
 from ncfix.compensate.plan.arrays import Index, Mask
 from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.intent import Intent
@@ -242,7 +242,7 @@ class ContinuedPart:
 class MachineParts(Parts):
     """The parts of a program on a machine, with every tool length known. Gone through once.
 
-    machine  as it is; `placed` with the workpiece where the setup has it
+    machine  as it is; `set_up` with the workpiece where the setup has it
     count    parts so far
     tools    what was taken as zero of tool lengths, in words
     notes    what there is to say about them
@@ -252,7 +252,7 @@ class MachineParts(Parts):
     """
 
     machine: Machine
-    placed: Machine
+    set_up: Machine
     setup: Setup
     count: int = 0
     tools: dict[str, str] = field(default_factory=dict)
@@ -272,7 +272,7 @@ class MachineParts(Parts):
             task.size,
             matters(task.machine),
             machine=task.machine,
-            placed=resolving(placed(task.machine, task.setup), task.dialect, task.head),
+            set_up=resolving(with_workpiece(task.machine, task.setup), task.dialect, task.head),
             setup=task.setup,
         )
 
@@ -298,7 +298,7 @@ class MachineParts(Parts):
                 continue
             if self.look is not None:
                 self.look(part)
-            continued = ContinuedPart(part, head, direction, self.placed)
+            continued = ContinuedPart(part, head, direction, self.set_up)
             units = {frame.unit for frame in part.moves.frames}
             if head is not None and not units <= self.units:
                 raise NotInPartsError("the program changes between inch and mm")

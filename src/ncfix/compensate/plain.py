@@ -237,7 +237,7 @@ class Planner:
     machine: Machine
     options: FixOptions
     strategy: Strategy
-    demands: Requirements
+    required: Requirements
 
     @classmethod
     def of(cls, machine: Machine, options: FixOptions) -> Planner | None:
@@ -254,8 +254,8 @@ class Planner:
             or machine.linear_ways is None
         ):
             return None
-        demands = Requirements(budget, Closure(), options.split_rapids, arc_pieces=False)
-        return cls(machine, options, strategy, demands)
+        required = Requirements(budget, Closure(), options.split_rapids, arc_pieces=False)
+        return cls(machine, options, strategy, required)
 
     def plan(self, continued: ContinuedPart) -> PlainPlan | None:
         """The plan of a part behind the last motion of the one before; None if it needs the long way."""
@@ -323,7 +323,7 @@ class Planner:
         """
         moves, found = intent.moves, None
         if not moves.tcp[0]:
-            found = arcs_and_dwells(intent, real, plain, continued.part.program.dialect, self.demands.budget.rounding)
+            found = arcs_and_dwells(intent, real, plain, continued.part.program.dialect, self.required.budget.rounding)
         if found is None or moves.kind[-1] == MotionKind.DWELL:
             return None, None
         turned, others = found
@@ -342,10 +342,10 @@ class Planner:
 
         Also what there is to say of those that must not be split. An arc that would have to be needs the long way.
         """
-        moves, limit = intent.moves, self.demands.budget.path
+        moves, limit = intent.moves, self.required.budget.path
         rows = np.flatnonzero(~(bound <= SURE * limit) & among)
         moving = some(np.abs(picked(moves.end, rows) - picked(moves.start, rows)) >= REST)
-        rows = rows[moving if self.demands.split_rapids else moving & (moves.kind[rows] != MotionKind.RAPID)]
+        rows = rows[moving if self.required.split_rapids else moving & (moves.kind[rows] != MotionKind.RAPID)]
         if not rows.size:
             return rows, None, ()
         checked = np.zeros(len(moves), dtype=bool) if check_start is None else check_start
@@ -358,7 +358,7 @@ class Planner:
         rows, deviation = rows[over], worst[over]
         if not rows.size:
             return rows, None, findings
-        parts = in_pieces(intent, real, rows, deviation, self.strategy, self.demands)
+        parts = in_pieces(intent, real, rows, deviation, self.strategy, self.required)
         return rows, parts if np.isfinite(parts.worst).all() else None, findings
 
     def _bounds(self, meant: Array, done: Array, tool_length: Array) -> Array:

@@ -349,7 +349,7 @@ def refusals(program: Program, account: Account) -> list[Refusal]:
 def in_lines(report: FixReport, flat: Flat, program: Program) -> FixReport:
     """The report of a flat program with the lines of the original."""
 
-    def placed(message: Message) -> Message:
+    def with_lines(message: Message) -> Message:
         place = message.place
         if place is None or not 1 <= place.line <= len(flat.lines):
             return message
@@ -361,4 +361,4 @@ def in_lines(report: FixReport, flat: Flat, program: Program) -> FixReport:
     after = dict(report.error_after_um)
     if after.get("where"):
         after["where"] = flat.lines[int(after["where"] or 1) - 1]
-    return replace(report, refused=refused, error_after_um=after, warnings=(note, *map(placed, report.warnings)))
+    return replace(report, refused=refused, error_after_um=after, warnings=(note, *map(with_lines, report.warnings)))

@@ -63,7 +63,7 @@ class Round:
         count = int(np.flatnonzero(np.append(True, changes))[-1]) + 1
         return Round(self.unchanged[:count], self.shift[:count], self.position)
 
-    def goes_on(self, other: Round) -> bool:
+    def is_repeated_by(self, other: Round) -> bool:
         """Whether another round, behind this one, only repeats its end."""
         return (
             len(other.unchanged) == 1
@@ -103,7 +103,7 @@ class PrecedingMotion:
         """From all rounds of a part."""
         found: list[Round] = []
         for each in map(Round.shortened, rounds):
-            if not found or not found[-1].goes_on(each):
+            if not found or not found[-1].is_repeated_by(each):
                 found.append(each)
         return cls(tuple(found), direction)
 
@@ -238,13 +238,13 @@ class Planning:
 
     intent    the motions on the machine
     strategy  finds the corrected commands
-    demands   tolerance, and what the control accepts as an arc
+    required   tolerance, and what the control accepts as an arc
     held      the angle that the control may be told, see `WrittenLanguage.held_angle`; None: any
     """
 
     intent: Intent
     strategy: Strategy
-    demands: Requirements
+    required: Requirements
     held: HeldAngle | None
 
     @classmethod
@@ -296,7 +296,7 @@ class Planning:
                 unchanged[0] |= head.unchanged[at]
                 shift = head.shift[at]
             unchanged, reaches_back = _with_what_they_need(moves, unchanged, bound, reasons)
-            planned = plan(self.intent, self.strategy, self.demands, unchanged, shift)
+            planned = plan(self.intent, self.strategy, self.required, unchanged, shift)
             if len(moves):  # of the last one
                 off = planned.start[-1] - moves.start[-1]
                 history.append((bool(planned.pieces.unchanged[-1]), np.where(np.isfinite(off), off, 0.0)))

@@ -160,7 +160,7 @@ Read = Callable[[int], bytes]
 class PartResult(Protocol):
     """What has been done to a part."""
 
-    def placed(self, file: int, at: int) -> Any:
+    def written_into(self, file: int, at: int) -> Any:
         """Put the text into a file, from a byte on; the result with how long it is instead of it."""
 
 
@@ -391,7 +391,7 @@ def _work(worker: Callable[[Read], Worker[Any]], files: OpenFiles, jobs: int, pr
         share, number = WorkShare(jobs, mailbox), process
         try:
             for number, done in worker(BackgroundReader(files.text, files.whole, mailbox)).work(share):
-                mailbox.send("done", number, done.placed(files.out, share.begin), 0)
+                mailbox.send("done", number, done.written_into(files.out, share.begin), 0)
                 number += jobs
         except WorkerGoneError:
             raise

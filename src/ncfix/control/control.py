@@ -186,7 +186,7 @@ class ProgramControl(ControlState):
         """A mode that suspended motions is over; whether it was in force. Where it has led axes is not known."""
         over = self.suspended.pop(mode, None) is not None
         if over and self.astray:
-            self.lose([index for index in self.machine if self.astray >> index & 1], ASTRAY)
+            self.lose([index for index in self.axis_indices if self.astray >> index & 1], ASTRAY)
             self.astray = self.astray if self.suspended.keys() - self.followed else 0
         return over
 
@@ -239,7 +239,7 @@ class ProgramControl(ControlState):
 
     def refuse_here(self, reason: str) -> None:
         """A block of which it is not known where it leads: none of the axes is known afterwards."""
-        unknown = dict.fromkeys(self.machine, AFTER_THAT.format(reason))
+        unknown = dict.fromkeys(self.axis_indices, AFTER_THAT.format(reason))
         self.make(Motion(MotionKind.FEED, 0, MotionEnd(self.position[:], unknown), 10, refusal=reason))
 
     @property
@@ -302,7 +302,7 @@ class ProgramControl(ControlState):
     def _moved_by(self, motion: Motion) -> int:
         """The axes that a motion names or moves, as bits."""
         target, here = motion.end.target, self.position
-        return mask_of(i for i in self.machine if motion.axes >> i & 1 or target[i] != here[i])
+        return mask_of(i for i in self.axis_indices if motion.axes >> i & 1 or target[i] != here[i])
 
     def placed_by(self, motion: Motion) -> int:
         """The axes whose words say where they stand behind the motion."""
@@ -341,10 +341,10 @@ class ProgramControl(ControlState):
         wordless = unplaced & self.places.unplaced & ~motion.axes
         if not wordless or motion.passing or motion.refusal or motion.end.unknown:
             return motion
-        moved = mask_of(i for i in self.machine if motion.end.target[i] != self.position[i])
+        moved = mask_of(i for i in self.axis_indices if motion.end.target[i] != self.position[i])
         if self.is_rotated and motion.axes & self._turned():
             moved |= self._turned()
-        index = next((i for i in self.machine if (wordless & moved) >> i & 1), None)
+        index = next((i for i in self.axis_indices if (wordless & moved) >> i & 1), None)
         if index is None:
             return motion
         why = UNPLACED.format(LETTERS[index])
@@ -381,7 +381,7 @@ class ProgramControl(ControlState):
         way = [there - here for there, here in zip(motion.end.target, self.position, strict=True)]
         way = rotated(self.inverse, way) if self.is_rotated else way
         lacking = {*motion.end.unknown, *self.unknown}
-        still = mask_of(index for index in self.machine if abs(way[index]) <= NO_WAY and index not in lacking)
+        still = mask_of(index for index in self.axis_indices if abs(way[index]) <= NO_WAY and index not in lacking)
         across = still & ~plane if self.at_corner else 0
         return across | (plane if beside and plane & ~still == 0 else 0)
 
@@ -402,7 +402,7 @@ class ProgramControl(ControlState):
 
     def _turned(self) -> int:
         """Axes that are moved by words of others, since the frame is turned."""
-        return mask_of(i for i, row in enumerate(self.rotation) if i in self.machine and abs(row[i]) < ALONG)
+        return mask_of(i for i, row in enumerate(self.rotation) if i in self.axis_indices and abs(row[i]) < ALONG)
 
     @contextmanager
     def in_one_piece(self) -> Iterator[None]:
@@ -430,7 +430,7 @@ class ProgramControl(ControlState):
         pointing = self.posture.pointing if self.turns_in_plane and motion.kind != MotionKind.RAPID else None
         if pointing is None:
             return False
-        first, second = (self.machine[column] for column in pointing.columns)
+        first, second = (self.axis_indices[column] for column in pointing.columns)
         here, there = ((place[first], place[second]) for place in (self.position, motion.end.target))
         return pointing.stray(here, there) > FAR
 

@@ -160,7 +160,7 @@ class SetTool(Operation):
         if self.address in block.values:
             control.tools.select(round(block.values[self.address]), unsure=self.address in block.unknown)
         control.tools.change()
-        control.places.lose(mask_of(control.machine))
+        control.places.lose(mask_of(control.axis_indices))
 
     def __str__(self) -> str:
         return f"the tool {self.address} comes into the spindle"
@@ -216,7 +216,7 @@ def make_up(control: ProgramControl, block: BlockValues, what: str, turned: Coll
     Those are the axes of the block, and `turned` by their letters' indices.
     """
     led = (X, Y, Z, *turned)
-    gone = {index for index in control.machine if block.axes >> index & 1 or index in led}
+    gone = {index for index in control.axis_indices if block.axes >> index & 1 or index in led}
     unknown = control.unknown | dict.fromkeys(sorted(gone), AFTER_MADE)
     control.make(Motion(MotionKind.FEED, block.axes, MotionEnd(control.position[:], unknown), 0, refusal=what))
 
@@ -291,7 +291,7 @@ class Resume(Operation):
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
         if control.resume(self.mode):
-            control.lose(control.machine, AFTER.format(self.mode))
+            control.lose(control.axis_indices, AFTER.format(self.mode))
 
     def __str__(self) -> str:
         return f"the end of {self.mode}"

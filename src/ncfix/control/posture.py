@@ -114,7 +114,7 @@ class MachinePosture:
     """
 
     def __init__(self, kinematics: Kinematics | None, machine: tuple[int, ...], rotary: Sequence[bool]) -> None:
-        self.kinematics, self.machine, self.rotary = kinematics, machine, rotary
+        self.kinematics, self.axis_indices, self.rotary = kinematics, machine, rotary
         self._directions: tuple[Vector, MachineDirections] | None = None
 
     @cached_property
@@ -123,8 +123,8 @@ class MachinePosture:
 
         None if the machine has others, if it lacks X, Y or Z, or if nobody knows its kinematics.
         """
-        turning = [index for index in self.machine if self.rotary[index]]
-        if self.kinematics is None or len(turning) != 2 or not {X, Y, Z} <= {*self.machine}:
+        turning = [index for index in self.axis_indices if self.rotary[index]]
+        if self.kinematics is None or len(turning) != 2 or not {X, Y, Z} <= {*self.axis_indices}:
             return None
 
         def directions(first: float, second: float) -> FloatArray:
@@ -132,7 +132,7 @@ class MachinePosture:
             position[turning[0]], position[turning[1]] = first, second
             return (self._tip(position, 0.0) - self._tip(position, PROBE)) / PROBE
 
-        return Pointing.of((self.machine.index(turning[0]), self.machine.index(turning[1])), directions)
+        return Pointing.of((self.axis_indices.index(turning[0]), self.axis_indices.index(turning[1])), directions)
 
     def postures(self, direction: Sequence[float], rules: WayRules, here: Pair) -> Postures | None:
         """The ways to point the tool along a unit vector in the workpiece, from where the two rotary axes stand.
@@ -153,7 +153,7 @@ class MachinePosture:
         if rules.sense and not at_pole:
             ways.sort(key=lambda way: -rules.sense * way[1])
         outer, inner = pointing.columns
-        return Postures(pointing, (self.machine[outer], self.machine[inner]), here, ways, at_pole)
+        return Postures(pointing, (self.axis_indices[outer], self.axis_indices[inner]), here, ways, at_pole)
 
     def only_posture(self, direction: Sequence[float], rules: WayRules) -> Postures | None:
         """The way to point the tool along a unit vector from wherever the axes may stand.
@@ -170,7 +170,7 @@ class MachinePosture:
 
     def directions(self, position: Vector) -> MachineDirections | None:
         """How the machine stands with its rotary axes at these positions; None if nobody knows its kinematics."""
-        if self.kinematics is None or not {X, Y, Z} <= {*self.machine}:
+        if self.kinematics is None or not {X, Y, Z} <= {*self.axis_indices}:
             return None
         still = [value if self.rotary[index] else 0.0 for index, value in enumerate(position)]
         if self._directions is None or self._directions[0] != still:
@@ -188,9 +188,9 @@ class MachinePosture:
     def _tip(self, position: Vector, length: float) -> FloatArray:
         """The tip (3,) of a tool of some length in the workpiece, mm."""
         assert self.kinematics is not None
-        command = [position[index] for index in self.machine]
+        command = [position[index] for index in self.axis_indices]
         found = self.kinematics(command, TcpState(False, length), TcpState(True, length))
-        return np.array([found[self.machine.index(index)] for index in (X, Y, Z)])
+        return np.array([found[self.axis_indices.index(index)] for index in (X, Y, Z)])
 
 
 def within(ways: Iterable[Pair], travel: Sequence[Pair], near: Pair) -> list[Pair]:

@@ -160,7 +160,7 @@ def named_switches(switches: Collection[int]) -> str:
 class ControlState(ABC):
     """Where the axes stand, in commands and in the coordinates of the program.
 
-    machine    letter indices of the machine's axes, in the order of its columns
+    axis_indices  letter indices of the axes of the machine, in the order of its columns
     rotary     for each letter whether it turns; `turning`: the letter indices of the machine's rotary axes
     posture    where the machine points its tool and its axes
     modal      what is in force of modal codes; `tools` likewise
@@ -189,12 +189,12 @@ class ControlState(ABC):
         self.setup = run.setup
         self.kinematics = run.kinematics
         self.dialect = dialect
-        self.machine = tuple(INDEX[axis] for axis in run.axes)
+        self.axis_indices = tuple(INDEX[axis] for axis in run.axes)
         self.rotary = tuple(
             (letter in run.rotary) if letter in run.axes else letter in ROTARY_LETTERS for letter in LETTERS
         )
-        self.turning = tuple(index for index in self.machine if self.rotary[index])
-        self.posture = MachinePosture(run.kinematics, self.machine, self.rotary)
+        self.turning = tuple(index for index in self.axis_indices if self.rotary[index])
+        self.posture = MachinePosture(run.kinematics, self.axis_indices, self.rotary)
         self.modal = Modal()
         self.frames = FrameStack(self.frame_order)
         self.composed = WORLD
@@ -361,7 +361,7 @@ class ControlState(ABC):
 
     def lose(self, indices: Sequence[int], reason: str) -> None:
         """These axes stand somewhere that is not known from here on; `reason` has a `{}` for the axis letter."""
-        gone = {index: reason for index in indices if index in self.machine}
+        gone = {index: reason for index in indices if index in self.axis_indices}
         if self.frame_unknown is not None:
             self.frame_unknown = self.frame_unknown | self.along_frame(gone)
         self.unknown.update(gone)
@@ -371,7 +371,7 @@ class ControlState(ABC):
 
         Returns all that are not known for that reason, as bits.
         """
-        gone = {index for index in indices if index in self.machine}
+        gone = {index for index in indices if index in self.axis_indices}
         lost = sorted(gone | {*XYZ} if gone and self.tcp else gone)
         self.lose(lost, reason)
         return mask_of(lost)
@@ -397,7 +397,7 @@ class ControlState(ABC):
     def axes_of(self, lost: UnknownAxes) -> UnknownAxes:
         """Which axes of the machine are not known where this is not known along those of the program's frame."""
         mixed = mixed_into(lost, self.rotation) if lost and self.is_rotated else lost
-        return {index: why for index, why in mixed.items() if index in self.machine}
+        return {index: why for index, why in mixed.items() if index in self.axis_indices}
 
     def stands_square(self) -> bool:
         """Whether the tool is known to lie along Z of a tilted plane that is in force."""
@@ -412,7 +412,7 @@ class ControlState(ABC):
         way wherever that is. `here` says so where the control does not ask.
         """
         if here is None and self.posture.pointing is not None:
-            outer, inner = (self.machine[column] for column in self.posture.pointing.columns)
+            outer, inner = (self.axis_indices[column] for column in self.posture.pointing.columns)
             self.use_start_positions((outer, inner))
             if self.unknown.keys() & {outer, inner}:
                 return self.posture.only_posture(direction, rules)
@@ -429,7 +429,7 @@ class ControlState(ABC):
     @property
     def plane_axes(self) -> int:
         """The axes of the plane that the machine has, as bits."""
-        return self.modal.plane.axes & mask_of(self.machine)
+        return self.modal.plane.axes & mask_of(self.axis_indices)
 
     def tool_length(self) -> tuple[int, float]:
         """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""

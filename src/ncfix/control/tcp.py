@@ -50,7 +50,7 @@ def led_in_machine(control: ControlState, axes: Mapping[int, float], unsure: Unk
     """
     target, unknown = control.position[:], dict(control.unknown)
     tip = TcpState(True, control.length_under_tcp)
-    still = [index for index in (X, Y, Z) if index in control.machine and index not in axes]
+    still = [index for index in (X, Y, Z) if index in control.axis_indices and index not in axes]
     if control.tcp and still and not converted(control, target, unknown, tip, MACHINE):
         unknown |= dict.fromkeys(still, TURNED)
     for index, value in axes.items():
@@ -62,7 +62,7 @@ def led_in_machine(control: ControlState, axes: Mapping[int, float], unsure: Unk
         return MotionEnd(target, unknown)
     end = target[:]
     if not converted(control, target, unknown, MACHINE, tip):
-        turned = {index: TURNED for index in (X, Y, Z) if index in control.machine}
+        turned = {index: TURNED for index in (X, Y, Z) if index in control.axis_indices}
         return MotionEnd(target, unknown | turned | doubts)
     for index in still:
         if abs(target[index] - control.position[index]) < ALIKE:
@@ -86,10 +86,10 @@ def converted(control: ControlState, position: Vector, unknown: UnknownAxes, bef
     if rotary_at_zero(control, position, unknown):
         position[Z] += before.shift - after.shift
         return True
-    if control.kinematics is None or unknown.keys() & set(control.machine):
+    if control.kinematics is None or unknown.keys() & set(control.axis_indices):
         return False
-    command = control.kinematics([position[index] for index in control.machine], before, after)
-    for index, value in zip(control.machine, command, strict=True):
+    command = control.kinematics([position[index] for index in control.axis_indices], before, after)
+    for index, value in zip(control.axis_indices, command, strict=True):
         position[index] = value
     return True
 

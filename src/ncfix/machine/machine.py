@@ -306,7 +306,9 @@ class Machine:
 
         return self._evaluated(q, State(), None, ways, 3, len(axes))
 
-    def placed(self, q: ArrayLike, axes: tuple[int, ...], target: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
+    def xyz_for_tip(
+        self, q: ArrayLike, axes: tuple[int, ...], target: ArrayLike, tool_length: ArrayLike = 0.0
+    ) -> Array:
         """Where X, Y and Z (columns `axes`) of a perfect machine have to be for the tip to be at `target` (n, 3) mm.
 
         q  (n, n_axes) where all other axes are
@@ -318,7 +320,7 @@ class Machine:
         back: Array = np.linalg.inv(self.linear_ways).astype(np.float64)
 
         def places(chunk: Poses, part: slice) -> Array:
-            return self._perfect_route.placed(chunk, axes, back, goal[:, part])
+            return self._perfect_route.xyz_for_tip(chunk, axes, back, goal[:, part])
 
         return self._evaluated(q, State(tool_length), None, places, 3)
 

@@ -228,7 +228,7 @@ class Route:
         """
         return [steps.follows(self.plain[0], axis, *turns) for axis in axes]
 
-    def placed(self, poses: Poses, axes: Sequence[int], back: Array, target: Array) -> Array:
+    def xyz_for_tip(self, poses: Poses, axes: Sequence[int], back: Array, target: Array) -> Array:
         """Where linear axes have to be for the tip to be at `target` (3, n) mm, (3, n); of a route without errors.
 
         back  (3, 3) what takes a way of the tip to one of the axes: the inverse of `ways_together`

@@ -63,7 +63,7 @@ class BulkLayout:
     lead      of languages in which such lines begin with more than that: what of the block's own beginning they repeat
     opening   what stands on such lines before the axis words
     closing   what stands on them behind these
-    turns_named  a rotary axis that has no word gets none
+    only_named_rotary  a rotary axis that has no word gets none
     by_vector  rotary axes go where other words of the block lead them, exactly; they have none of their own
     arc       what there is of arcs; None where these are written one by one
     """
@@ -76,7 +76,7 @@ class BulkLayout:
     lead: Anchor | None = None
     opening: str = ""
     closing: str = ""
-    turns_named: bool = False
+    only_named_rotary: bool = False
     by_vector: bool = False
     arc: ArcLayout | None = None
 

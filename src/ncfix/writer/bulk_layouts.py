@@ -122,7 +122,7 @@ class Layouts:
         self.anchors[shape] = layout.words_at
         blank = ord(layout.blank) if layout.blank else 0
         self.heads[shape] = [(blank, ord(letter.lower() if layout.lower else letter)) for letter in axes]
-        if layout.turns_named:
+        if layout.only_named_rotary:
             self.heads[shape, moves.rotary & (self.slots[shape] < 0), 1] = 0
         if layout.by_vector:
             self.heads[shape, moves.rotary, 1] = VECTOR_HEAD

@@ -129,7 +129,7 @@ def along_contour(control: Sinumerik, block: int, drilling: Drilling, place: tup
     control.use_all_start_positions()
     assert drilling.depth is not None
     named, over, _ = lead_to(control, block, place, drilling.name)
-    control.builder.rests(mask_of(index for index in control.machine if index not in GEOMETRY))
+    control.builder.rests(mask_of(index for index in control.axis_indices if index not in GEOMETRY))
     modal, stated, down = copy(control.modal), control.stated, at_height(control, over, drilling.depth)
     drill(control, named, over, drilling)
     up = control.here()

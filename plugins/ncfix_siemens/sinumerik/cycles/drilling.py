@@ -233,7 +233,7 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
     named, over = BlockWordValues(block), control.here()
     if drilling.place is not None:
         named, over, _ = lead_to(control, block, drilling.place, name)
-        control.builder.rests(mask_of(index for index in control.machine if index not in GEOMETRY))
+        control.builder.rests(mask_of(index for index in control.axis_indices if index not in GEOMETRY))
     drill(control, named, over, drilling, refusal=WITH_WORDS if words.axes else "")
 
 
@@ -322,7 +322,7 @@ def measure(control: Sinumerik, block: int, step: Calling) -> None:
 
 def made(control: Sinumerik, block: int, *, refusal: str = "", passing: Passing | None = None) -> None:
     """Motions that the control makes up: where the axes stand after them is not known."""
-    gone = [index for index in GEOMETRY if index in control.machine]
+    gone = [index for index in GEOMETRY if index in control.axis_indices]
     lost = dict(control.lost_in_frame()) | dict.fromkeys(gone, AFTER_CYCLE)
     words = BlockWordValues(block, axes=mask_of(gone))
     control.go(MotionKind.RAPID, words, control.here(lost), control.modal.motion, refusal=refusal, passing=passing)

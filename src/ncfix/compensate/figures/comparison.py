@@ -149,7 +149,7 @@ class CutPaths:
         """The parts. Raises what reading and following do, and UsageError for what is not given."""
         task = self.task
         parts = MachineParts.of(task, self.read)
-        machine = parts.placed
+        machine = parts.set_up
         around = None
         for continued in parts:
             moves, lines = continued.part.moves, continued.part.lines

@@ -182,7 +182,7 @@ def tip_errors_on(task: Task, read: Read, said: list[Message]) -> Iterator[TipEr
             intent, lines = continued.intent, continued.joined.lines
             yield from tip_errors(intent, lines, int(continued.head is not None))
         else:
-            yield from tip_errors(Intent(parts.placed, continued.part.moves, State()), continued.part.lines)
+            yield from tip_errors(Intent(parts.set_up, continued.part.moves, State()), continued.part.lines)
     parts.check_behind()
     said += parts.messages
 

@@ -10,7 +10,7 @@ from ncfix.arguments import TOLERANCE_UM
 from ncfix.compensate.block_delete import SwitchSetting, in_pairs, messages_of, positions_of
 from ncfix.compensate.figures.comparison import RunningComparison, whole
 from ncfix.compensate.figures.simulation import lines_of
-from ncfix.compensate.following import Resolve, follow, placed, resolving
+from ncfix.compensate.following import Resolve, follow, resolving, with_workpiece
 from ncfix.compensate.plan.written import rounding
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import Message
@@ -132,7 +132,8 @@ def side_by_side(
     def positions(program: Program, resolve: Resolve | None) -> tuple[SwitchSetting, ...]:
         return positions_of(setup, lambda own: follow(program, machine, own, resolve).trace)
 
-    known, of_first, of_second = placed(machine, setup), positions(original, resolves[0]), positions(other, resolves[1])
+    known = with_workpiece(machine, setup)
+    of_first, of_second = positions(original, resolves[0]), positions(other, resolves[1])
     found: list[RunningComparison] = []
     for first, second in in_pairs(of_first, of_second):
         found.append(RunningComparison(tolerance_um / 1e3, rounding(machine)))

@@ -131,7 +131,7 @@ def reached_joints(machine: Machine, commands: Array, tcp: Mask, tool_length: Ar
     wanted, length = programmed_tip(machine, chosen), _of_rows(tool_length, rows)
     if moves_as_one(machine):
         x, y, z = columns.tolist()
-        q[rows[:, None], columns] = machine.placed(chosen, (x, y, z), wanted, length)
+        q[rows[:, None], columns] = machine.xyz_for_tip(chosen, (x, y, z), wanted, length)
         return q, reached
     maps, offset = affine_tip(machine, chosen, length)
     maps, fine = regular(maps)

@@ -173,7 +173,7 @@ class Requirements:
 
 
 def plan(
-    intent: Intent, strategy: Strategy, demands: Requirements, keep: Mask | None = None, before: Array | None = None
+    intent: Intent, strategy: Strategy, required: Requirements, keep: Mask | None = None, before: Array | None = None
 ) -> Plan:
     """Correct the motions of a program.
 
@@ -189,7 +189,7 @@ def plan(
     if machine.is_perfect or unchanged.all():
         as_it_is = untouched(moves, unchanged)
         return as_it_is if before is None else _behind(machine, as_it_is, moves, before)
-    return _plan(intent, strategy, demands, unchanged, before)
+    return _plan(intent, strategy, required, unchanged, before)
 
 
 def _behind(machine: Machine, as_it_is: Plan, moves: Moves, before: Array) -> Plan:
@@ -199,40 +199,40 @@ def _behind(machine: Machine, as_it_is: Plan, moves: Moves, before: Array) -> Pl
     return replace(as_it_is, start=where.start, pieces=replace(as_it_is.pieces, end=where.end))
 
 
-def _plan(intent: Intent, strategy: Strategy, demands: Requirements, unchanged: Mask, before: Array | None) -> Plan:
+def _plan(intent: Intent, strategy: Strategy, required: Requirements, unchanged: Mask, before: Array | None) -> Plan:
     ends = corrected(intent, strategy, np.flatnonzero(~unchanged))
     unchanged = unchanged | ends.failed
     if strategy.corrects_orientation:
         ends = with_rotary_as_it_stands(intent, ends, unchanged, before)
     approaches = corrected_approaches(intent, ends.wanted, unchanged) if strategy.follows_path else None
-    real, broken = _real(intent, ends.wanted, unchanged, demands, before, approaches)
+    real, broken = _real(intent, ends.wanted, unchanged, required, before, approaches)
     bound = intent.moves.compensated | crooked(intent) if strategy.follows_path else np.ones(len(unchanged), dtype=bool)
 
     def without(finding: Finding) -> Plan:
         """The plan in which the motions of a finding stay unchanged, too."""
         also = unchanged.copy()
         also[finding.moves] = True
-        planned = _plan(intent, strategy, demands, also, before)
+        planned = _plan(intent, strategy, required, also, before)
         return replace(planned, findings=(*ends.findings, finding, *planned.findings))
 
     text = "this arc would have to be made of straight pieces, and must not be split"
     if stuck := Finding.of("NCF415", np.flatnonzero(broken & bound), text):
         return without(stuck)
     beside = beside_contours(intent, real) if strategy.follows_path else None
-    if worse := _worse_contours(intent, beside, unchanged, demands):
+    if worse := _worse_contours(intent, beside, unchanged, required):
         return without(worse)
-    followed = _followed(intent, real, unchanged, strategy, demands)
-    deviation = _judged(intent, real, unchanged, broken, followed, demands)
-    limit = demands.budget.path
+    followed = _followed(intent, real, unchanged, strategy, required)
+    deviation = _judged(intent, real, unchanged, broken, followed, required)
+    limit = required.budget.path
     over = _not_far_off(intent, np.flatnonzero((deviation > limit) & ~bound))
     over = over[~too_long(intent, over)]
-    parts = in_pieces(intent, real, over, deviation[over], strategy, demands)
+    parts = in_pieces(intent, real, over, deviation[over], strategy, required)
     deviation[over] = parts.worst
     unseen, hint = _not_far_off(intent, np.flatnonzero(np.isinf(deviation))), "make several motions of it"
     text = "this motion is so long, or makes so many turns, that it cannot be looked at closely enough"
     if too_far := Finding.of("NCF417", unseen, text, hint):
         return without(too_far)
-    findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, unchanged, strategy, demands))
+    findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, unchanged, strategy, required))
     planned = assembled(intent.moves, real, unchanged, over, parts, deviation, ends.oriented, findings)
     known = Known(ends.before, ends.wanted, left_beside(intent, real, np.flatnonzero(followed)))
     corners = 0.0 if beside is None else float(beside.rounding[~unchanged[beside.move]].max(initial=0.0))
@@ -242,7 +242,7 @@ def _plan(intent: Intent, strategy: Strategy, demands: Requirements, unchanged: 
     return replace(planned, pieces=pieces, known=known, corners=corners)
 
 
-def _worse_contours(intent: Intent, beside: OffsetPoints | None, unchanged: Mask, demands: Requirements) -> Finding:
+def _worse_contours(intent: Intent, beside: OffsetPoints | None, unchanged: Mask, required: Requirements) -> Finding:
     """NCF454: contours (k,) with a corner that the control would make worse of what is corrected than it is without.
 
     Worse is what is beyond the tolerance, and more than before and what the control's digits do there.
@@ -252,7 +252,7 @@ def _worse_contours(intent: Intent, beside: OffsetPoints | None, unchanged: Mask
     if beside is None or intent.moves.beside is None:
         return none
     digits = 0.5 * intent.machine.least_increment[0] * beside.rounding
-    worse = beside.corner & (beside.after > demands.budget.tolerance) & (beside.after > beside.before + digits)
+    worse = beside.corner & (beside.after > required.budget.tolerance) & (beside.after > beside.before + digits)
     if not worse.any():
         return none
     offset = np.nan_to_num(intent.moves.beside, nan=1.0) != 0
@@ -267,56 +267,56 @@ def _real(
     intent: Intent,
     wanted: Array,
     unchanged: Mask,
-    demands: Requirements,
+    required: Requirements,
     before: Array | None,
     approaches: Array | None,
 ) -> tuple[Segments, Mask]:
     """What the control would be told without splitting, and the arcs (n,) that cannot stay arcs."""
     moves, programmed = intent.moves, intent.segments
-    wanted = with_closed_circles(intent, wanted, unchanged, demands.budget.path / 2, before, approaches)
+    wanted = with_closed_circles(intent, wanted, unchanged, required.budget.path / 2, before, approaches)
     where = standing(intent.machine, moves, wanted, unchanged, before, approaches)
     real = replace(programmed, start=where.start, end=where.end)
     broken = np.zeros(len(moves), dtype=bool)
     rows = np.flatnonzero(programmed.arc & ~unchanged)
     if not rows.size:
         return real, broken
-    fit = fitted(intent, real, rows, demands.closure, demands.budget.rounding)
+    fit = fitted(intent, real, rows, required.closure, required.budget.rounding)
     centre, sweep = programmed.centre.copy(), programmed.sweep.copy()
     centre[rows], sweep[rows] = fit.centre, fit.sweep
     broken[rows] = ~fit.sound
     return replace(real, centre=centre, sweep=sweep, arc=programmed.arc & ~broken), broken
 
 
-def _followed(intent: Intent, real: Segments, unchanged: Mask, strategy: Strategy, demands: Requirements) -> Mask:
+def _followed(intent: Intent, real: Segments, unchanged: Mask, strategy: Strategy, required: Requirements) -> Mask:
     """(n,) motions that are looked at along their way."""
     if not strategy.follows_path:
         return np.zeros(len(unchanged), dtype=bool)
     kind = intent.moves.kind
     followed = (
-        (kind == MotionKind.FEED) | (kind == MotionKind.ARC) | ((kind == MotionKind.RAPID) & demands.split_rapids)
+        (kind == MotionKind.FEED) | (kind == MotionKind.ARC) | ((kind == MotionKind.RAPID) & required.split_rapids)
     )
     return followed & ~unchanged & intent.moving(np.arange(len(unchanged))) & finite(real.start)
 
 
 def _judged(
-    intent: Intent, real: Segments, unchanged: Mask, broken: Mask, followed: Mask, demands: Requirements
+    intent: Intent, real: Segments, unchanged: Mask, broken: Mask, followed: Mask, required: Requirements
 ) -> Array:
     """How far the tip leaves the intended path along each motion, (n,) mm; 0 where it is not looked at."""
     deviation = np.zeros(len(unchanged))
     rows = np.flatnonzero(followed & ~broken)
-    deviation[rows] = deviations(intent, real, rows, starts_to_check(intent, unchanged), demands.budget.path)
+    deviation[rows] = deviations(intent, real, rows, starts_to_check(intent, unchanged), required.budget.path)
     deviation[followed & broken] = np.inf
     return deviation
 
 
 def in_pieces(
-    intent: Intent, real: Segments, rows: Index, deviation: Array, strategy: Strategy, demands: Requirements
+    intent: Intent, real: Segments, rows: Index, deviation: Array, strategy: Strategy, required: Requirements
 ) -> Split:
     """Motions `rows` in pieces: of arcs in arcs, where the control and the tolerance allow, else in straight ones."""
-    limit = demands.budget.path
+    limit = required.budget.path
     round_ = np.zeros(len(rows), dtype=bool)
-    if demands.arc_pieces:
-        round_ = may_be_round(intent, rows, demands.closure, demands.budget.rounding)
+    if required.arc_pieces:
+        round_ = may_be_round(intent, rows, required.closure, required.budget.rounding)
     arcs, parts = np.flatnonzero(round_), None
     if arcs.size:
         parts = split(intent, real, rows[arcs], _bows(deviation[arcs], limit), Cutter(strategy, limit, round=True))
@@ -363,11 +363,11 @@ def not_split(rows: Index, deviation: Array) -> Finding:
 
 
 def _remarks(
-    intent: Intent, deviation: Array, oriented: Mask, unchanged: Mask, strategy: Strategy, demands: Requirements
+    intent: Intent, deviation: Array, oriented: Mask, unchanged: Mask, strategy: Strategy, required: Requirements
 ) -> list[Finding]:
     """What is not as it was asked for, though no motion stays unchanged for it."""
     remarks = []
-    budget = demands.budget
+    budget = required.budget
     over = np.flatnonzero((deviation > budget.path) & (intent.moves.compensated | crooked(intent)))
     if over.size:
         remarks.append(not_split(over, deviation[over]))
