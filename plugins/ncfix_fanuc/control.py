@@ -15,6 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import RefusedError
 from ncfix.tables.axis_tables import reversal_note
 from ncfix.tables.compensation import Compensation, Term
@@ -32,7 +33,7 @@ from ncfix.tables.control import (
     whole,
     wrong_setting,
 )
-from ncfix.tables.grid import Array, Grid
+from ncfix.tables.grid import Grid
 from ncfix.tables.lower_bounds import least_of_even_nodes, least_of_functions
 from ncfix.tables.table_files import Remarks
 from ncfix.tables.volume import AIM, Mesh, Volume, search, unseen_axes

@@ -20,11 +20,12 @@ from typing import Any
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.tables.axis_tables import reversals
 from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Assumption, Files, Option, Request, SettingForm, number, one_of
-from ncfix.tables.grid import Array, Grid
+from ncfix.tables.grid import Grid
 from ncfix.tables.table_files import DEGREE, Remarks
 from ncfix.values import frozen
 from ncfix_fanuc import json_values

@@ -11,13 +11,13 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.tables.axis_tables import positioning
 from ncfix.tables.compensation import Compensation
 from ncfix.tables.control import Assumption, FileControl, Files, Option, Properties, Request, Written, whole
-from ncfix.tables.grid import Array, Grid
+from ncfix.tables.grid import Grid
 from ncfix.tables.lower_bounds import least_of_own_axis
 from ncfix.tables.table_files import DEGREE, TURNING, Remarks, in_order, messages_of, unit_of
 from ncfix_fanuc.parameters import (
@@ -278,7 +278,7 @@ def _ends(low: float, high: float, interval: float) -> tuple[int, int]:
     return first, max(math.ceil(high / interval - 1e-9), first + 1)
 
 
-def diffused(curve: Array) -> tuple[NDArray[np.int64], int]:
+def diffused(curve: Array) -> tuple[Ints, int]:
     """Increments from -7 to 7 whose sums follow a curve (detection units) within half a step, and the magnification.
 
     The first increment leads to the first point and is none: sums count from the reference position, where the curve

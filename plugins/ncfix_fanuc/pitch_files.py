@@ -10,11 +10,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints
 from ncfix.tables.compensation import Term
 from ncfix.tables.control import Files
-from ncfix.tables.grid import Array, Grid
+from ncfix.tables.grid import Grid
 from ncfix.tables.table_files import TURNING, Remarks, as_number, unit_of
 from ncfix.values import frozen
 from ncfix_fanuc.parameters import SIGNS, entries_of, read_records, sense_of
@@ -49,7 +49,7 @@ class Pitch:
 
     axis: str
     first: int
-    increments: NDArray[np.int64]
+    increments: Ints
     reference: int
     magnification: int
     interval: float
@@ -75,7 +75,7 @@ def is_increments(content: bytes) -> bool:
     return next((row for row in rows if row.strip()), "") == HEAD
 
 
-def read_increments(remarks: Remarks) -> tuple[int, NDArray[np.int64]]:
+def read_increments(remarks: Remarks) -> tuple[int, Ints]:
     """The number of the first point, and the increments."""
     rows = [(line, row) for line, row in enumerate(remarks.rows, 1) if row.split("#", 1)[0].strip()]
     if not rows or rows[0][1].replace(" ", "").lower() != HEAD:

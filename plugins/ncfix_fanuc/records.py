@@ -14,11 +14,11 @@ from string import Formatter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints
 from ncfix.diagnostics import RefusedError
 from ncfix.tables.control import Files
-from ncfix.tables.grid import Array, Grid, full_grid
+from ncfix.tables.grid import Grid, full_grid
 from ncfix.tables.table_files import DEGREE, Remarks, unit_of
 from ncfix.values import frozen
 from ncfix_fanuc import json_values
@@ -77,7 +77,7 @@ class Volc:
     step: tuple[float, ...]
     unit: float
     magnification: int
-    values: NDArray[np.int64]
+    values: Ints
     style: PointNumbering = PointNumbering()
     placing: Placing | None = None
 
@@ -87,12 +87,12 @@ class Volc:
         return tuple("XYZ".index(axis) for axis in reversed(self.style.order))
 
     @property
-    def rows(self) -> NDArray[np.int64]:
+    def rows(self) -> Ints:
         """By point number, (n, 3)."""
         return self.values.transpose(*self.axes, 3).reshape(-1, 3)
 
     @property
-    def places(self) -> NDArray[np.float64]:
+    def places(self) -> Array:
         """The positions of the points by number, (n, 3) mm."""
         points = full_grid(_nodes(self.low, self.step, self.values.shape)).reshape(self.values.shape)
         return points.transpose(*self.axes, 3).reshape(-1, 3)
@@ -307,8 +307,8 @@ class Lattice:
     low: tuple[float, ...]
     step: tuple[float, ...]
     scale: WholeNumberScale
-    lin: NDArray[np.int64]
-    rot: NDArray[np.int64]
+    lin: Ints
+    rot: Ints
     centre: tuple[float, ...] = ()
     home_minus: str = ""
     placing: Placing | None = None

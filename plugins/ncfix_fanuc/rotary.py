@@ -20,13 +20,14 @@ from typing import ClassVar
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, State
 from ncfix.tables.axis_tables import reversal_note
 from ncfix.tables.compensation import NOTHING, Compensation, Tables
 from ncfix.tables.control import Assumption, FileControl, Files, Option, Properties, Request, Written, one_of, whole
 from ncfix.tables.correction import corners, exact_correction, linear_axes, residual
-from ncfix.tables.grid import Array, Grid
+from ncfix.tables.grid import Grid
 from ncfix.tables.table_files import DEGREE, Remarks, in_order
 from ncfix.tables.volume import AIM, Mesh, Volume, inputs_that_matter, search, unseen_axes
 from ncfix.values import frozen

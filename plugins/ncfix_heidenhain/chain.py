@@ -15,11 +15,12 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.machine import Axis, Machine, State
 from ncfix.tables.axis_tables import nodes_needed
 from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.correction import even_poses, poses_along
-from ncfix.tables.grid import Array, Grid, projector
+from ncfix.tables.grid import Grid, projector
 from ncfix.tables.table_files import DEGREE, TURNING, Remarks, unit_of
 from ncfix.values import frozen
 from ncfix_heidenhain.table_files import TableColumn, TextTable, cell_number, read_table

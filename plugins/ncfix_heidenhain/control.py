@@ -12,11 +12,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.tables.axis_tables import AxisTables, additive, reversal_note
 from ncfix.tables.compensation import Compensation, Term, own_terms
 from ncfix.tables.control import Assumption, FileControl, Files, Option, Properties, Request, Written, one_of, whole
-from ncfix.tables.grid import Array, Grid
+from ncfix.tables.grid import Grid
 from ncfix.tables.lower_bounds import least_of_sums
 from ncfix.tables.table_files import DEGREE, ORDER, Remarks, in_order, messages_of, unit_of
 from ncfix_heidenhain.table_files import CONFIG, ComTable, cma_text, nck_text, old_text, read_cma, read_com

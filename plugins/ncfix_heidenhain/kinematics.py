@@ -8,11 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.machine import Machine
 from ncfix.tables.compensation import Compensation, Tables, Term, own_terms
 from ncfix.tables.control import Assumption, FileControl, Files, Option, Properties, Request, Written, one_of, whole
-from ncfix.tables.grid import Array, Grid
+from ncfix.tables.grid import Grid
 from ncfix.tables.table_files import DEGREE, Remarks, in_order, messages_of, unit_of
 from ncfix_heidenhain.chain import (
     LETTERS,

@@ -16,8 +16,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.tables.control import Files
-from ncfix.tables.grid import Array
 from ncfix.tables.table_files import ORDER, Remarks, as_number
 from ncfix.values import frozen
 

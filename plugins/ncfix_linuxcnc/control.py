@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix.plugin import (
     Array,
@@ -222,7 +221,7 @@ def _table(remarks: Remarks, number: int, axis: str, measured: bool, scale: floa
     nodes, trims = rows[:, 0], rows[:, :1] - rows[:, 1:] if measured else rows[:, 1:]
     if not _too_large(remarks, trims * scale, measured, "degree" if axis in TURNING else "mm"):
         _look_for_jumps(remarks, steps, trims)
-    stored: NDArray[np.float64] = trims.astype(np.float32).astype(np.float64) * scale
+    stored: Array = trims.astype(np.float32).astype(np.float64) * scale
     return JointTable(number, axis, nodes * scale, stored[:, 0], stored[:, 1])
 
 

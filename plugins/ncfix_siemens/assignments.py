@@ -13,7 +13,7 @@ from dataclasses import field, replace
 
 import numpy as np
 
-from ncfix.tables.grid import Array
+from ncfix.arrays import Array
 from ncfix.tables.table_files import Remarks
 from ncfix.values import frozen, mutable
 

@@ -14,12 +14,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.machine import State
 from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Assumption, FileControl, Files, Least, Option, Properties, Request, Written
 from ncfix.tables.correction import orientation_error, random_poses
-from ncfix.tables.grid import Array
 from ncfix.tables.scheme import Scheme, SchemeTask, automatic
 from ncfix.tables.scheme_fixed import fixed
 from ncfix.tables.table_files import Remarks, messages_of

@@ -11,9 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.control import Files
-from ncfix.tables.grid import Array, Grid
+from ncfix.tables.grid import Grid
 from ncfix.tables.table_files import Remarks, unit_of
 from ncfix.values import frozen
 from ncfix_siemens.assignments import VALUE_FILES, parsed, settings

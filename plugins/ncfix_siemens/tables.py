@@ -10,7 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from ncfix.tables.grid import Array, Grid
+from ncfix.arrays import Array
+from ncfix.tables.grid import Grid
 from ncfix.tables.table_files import Remarks
 from ncfix.values import frozen
 from ncfix_siemens.assignments import ArrayAssignment, Assigned, FileRow, assignments

@@ -32,6 +32,7 @@ from ncfix.text.dialect import Dialect as Dialect
 from ncfix.values import frozen as frozen
 
 if TYPE_CHECKING:
+    from ncfix.arrays import Array as Array
     from ncfix.control.operations import ALL_AXES as ALL_AXES
     from ncfix.control.operations import Like as Like
     from ncfix.control.operations import Lose as Lose
@@ -84,7 +85,6 @@ if TYPE_CHECKING:
     from ncfix.tables.forms import TableFile as TableFile
     from ncfix.tables.forms import form_named as form_named
     from ncfix.tables.forms import read_form as read_form
-    from ncfix.tables.grid import Array as Array
     from ncfix.tables.grid import Grid as Grid
     from ncfix.tables.grid import full_grid as full_grid
     from ncfix.tables.lower_bounds import least_of_own_axis as least_of_own_axis
@@ -97,6 +97,7 @@ if TYPE_CHECKING:
 
 HERE = ("FOREIGN", "TURNING", "CycleTable", "Dialect", "Register", "family", "frozen", "hookimpl", "made_by")
 ELSEWHERE = {
+    "ncfix.arrays": ("Array",),
     "ncfix.control.operations": (
         *("ALL_AXES", "Like", "Lose", "MakeUp", "Operation", "Rapid", "Refuse", "Resume", "SetLength", "SetTool"),
         "Suspend",
@@ -117,7 +118,7 @@ ELSEWHERE = {
     ),
     "ncfix.tables.correction": ("exact_correction",),
     "ncfix.tables.forms": ("FileForm", "TableFile", "form_named", "read_form"),
-    "ncfix.tables.grid": ("Array", "Grid", "full_grid"),
+    "ncfix.tables.grid": ("Grid", "full_grid"),
     "ncfix.tables.lower_bounds": ("least_of_own_axis",),
     "ncfix.tables.table_files": ("Remarks", "as_number", "check_all", "in_order", "messages_of", "unit_of"),
 }

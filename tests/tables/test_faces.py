@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.tables.grid import Array, Bending
+from ncfix.arrays import Array
+from ncfix.tables.grid import Bending
 from ncfix.tables.grid_sums import faces, interactions, searched
 from ncfix.tables.volume import Volume
 

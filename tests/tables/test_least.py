@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ncfix.arrays import Array
 from ncfix.machine import Effect, Machine, loads
 from ncfix.machine.basis import Fourier
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.correction import ranges_of, residual
 from ncfix.tables.export import export
-from ncfix.tables.grid import Array, Grid
+from ncfix.tables.grid import Grid
 from ncfix.tables.lower_bounds import least_of_even_nodes, least_of_functions, least_of_own_axis, least_of_sums
 from ncfix.tables.volume import Volume
 from ncfix.testing import single_error

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.tables.grid import Array
+from ncfix.arrays import Array
 from ncfix.tables.lower_bounds import least_worst
 
 LINES = [np.linspace(-1, 1, 6), np.linspace(-1, 1, 5), np.linspace(0, 1, 7)]

@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterable
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array
 from ncfix.control.coordinates import mask_of
 from ncfix.control.expressions import Fault, Unknown, Value
 from ncfix.control.flow import NO_SUBPROGRAM, Call, Jump, Let, OpenCall, Operation, ProgramFlow, Return
@@ -139,7 +139,7 @@ class Outline:
             del open_loops[at:]
 
     @cached_property
-    def numbers(self) -> NDArray[np.float64]:
+    def numbers(self) -> Array:
         """(n,) the N word of each block, NaN without."""
         return self.unit.program.column("N")
 

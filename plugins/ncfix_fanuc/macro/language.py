@@ -7,8 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Ints, Mask
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.text.language import BulkLayout
 from ncfix.text.layout import CENTRE_LETTERS, BlockWords, Layout
@@ -56,10 +56,10 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     return replace(found, further=False) if found is not None and stops else found
 
 
-def one_by_one(program: Program, moves: Moves, _pieces: Pieces, _first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:
+def one_by_one(program: Program, moves: Moves, _pieces: Pieces, _first_piece: Ints) -> Mask:
     """(n,) straight motions with I J K: there these give the direction of the tool (G43.5)."""
     shapes = [any(word.address in CENTRE_LETTERS for word in template.words) for template in program.templates]
-    pointed: NDArray[np.bool_] = np.array(shapes, dtype=np.bool_)[program.template[moves.block]]
+    pointed: Mask = np.array(shapes, dtype=np.bool_)[program.template[moves.block]]
     pointed &= moves.kind != MotionKind.ARC
     return pointed
 

@@ -14,13 +14,9 @@ from bisect import bisect_left
 from functools import lru_cache
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ncfix.arrays import Array, Ints
 from ncfix.control.arcs import sweep_angle
 from ncfix.text.spelling import Spelling, value_of
-
-FloatArray = NDArray[np.float64]
 
 POLE_DIGITS, ANGLE_DIGITS = 4, 4
 """What a control takes after the point of a coordinate, and of an angle (TNC 640, "Technical information")."""
@@ -70,14 +66,14 @@ class PieceOfArc(NamedTuple):
     decimals    (n_axes,) digits after the point
     """
 
-    begin: FloatArray
-    end: FloatArray
-    centre: FloatArray
+    begin: Array
+    end: Array
+    centre: Array
     plane: tuple[int, int, int]
     spatial: tuple[int, int, int]
     clockwise: bool
     turn: float | None
-    decimals: NDArray[np.int64]
+    decimals: Ints
 
     @property
     def columns(self) -> list[int]:
@@ -100,8 +96,8 @@ class ArcText(NamedTuple):
     pole: tuple[str, ...]
     words: tuple[str, ...]
     sense: str
-    end: FloatArray
-    centre: FloatArray
+    end: Array
+    centre: Array
 
 
 class InPlane(NamedTuple):
@@ -234,7 +230,7 @@ def seen_under(arc: InPlane, angle: float) -> complex:
     return (arc.begin + arc.end) / 2 + 0.5 / half * (1j * (arc.end - arc.begin))
 
 
-def spatial(arc: PieceOfArc, middle: complex) -> FloatArray:
+def spatial(arc: PieceOfArc, middle: complex) -> Array:
     """A centre in the plane as one of X Y Z, (3,); across the plane it lies where the arc begins."""
     found = arc.centre.copy()
     found[arc.plane[0]], found[arc.plane[1]] = middle.real, middle.imag

@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix import core
+from ncfix.arrays import Bytes, Ints, Mask
 from ncfix.control.expressions import Fault, Unknown
 from ncfix.text.build import MAX_DEPTH, Parsed, TooDeepError, TreeBuilder, edges, is_token, kind, tokens_of
 from ncfix.text.dialect import Dialect
@@ -71,7 +71,7 @@ COMMAS = bytes.maketrans(b",\n", b".\x0b")
 """Decimal commas as points, and line ends within a block as blanks: for the scan only, which counts bytes."""
 
 
-def split(source: bytes) -> NDArray[np.int64]:
+def split(source: bytes) -> Ints:
     """Start and stop byte of each block, shape (n, 2): lines, with those that `~` continues joined."""
     lines = split_blocks(source)
     marks = np.array([match.start() for match in JOINED.finditer(source)], dtype=np.int64)
@@ -84,7 +84,7 @@ def split(source: bytes) -> NDArray[np.int64]:
     return np.stack((lines[starts, 0], lines[~continued, 1]), axis=1)
 
 
-def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+def scan(source: bytes, blocks: Ints) -> Scan:
     """Find the numbers and the shape of every block. A block of several lines has none: it is taken as it is."""
     if core.engaged():
         text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
@@ -96,14 +96,14 @@ def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     return in_slices(source, blocks, scan_plain)
 
 
-def in_halves(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+def in_halves(source: bytes, blocks: Ints) -> Scan:
     """As `scan`, where some block has to be taken as it is: the others need not be."""
     middle = len(blocks) // 2
     at = int(blocks[middle, 0])
     return Scan.joined([(0, scan(source[:at], blocks[:middle])), (at, scan(source[at:], blocks[middle:] - at))])
 
 
-def scan_plain(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+def scan_plain(source: bytes, blocks: Ints) -> Scan:
     """As `scan`, with numpy alone."""
     text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
     comments = np.array([match.span() for match in COMMENT.finditer(source)], dtype=np.int64).reshape(-1, 2)
@@ -119,7 +119,7 @@ def scan_plain(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     return found.setting_apart(misnumbered(text, blocks, found))
 
 
-def misnumbered(text: NDArray[np.uint8], blocks: NDArray[np.int64], found: Scan) -> list[int]:
+def misnumbered(text: Bytes, blocks: Ints, found: Scan) -> list[int]:
     """The blocks that begin with a number that is no block number: it has a sign or a point."""
     rows = np.flatnonzero(np.diff(found.first_number))
     spans, begins = found.spans[found.first_number[rows]], blocks[rows, 0]
@@ -131,7 +131,7 @@ def misnumbered(text: NDArray[np.uint8], blocks: NDArray[np.int64], found: Scan)
     return [int(rows[row]) for row in suspicious if not leading[begins[row] : spans[row, 0]].strip(BEFORE_NUMBERS)]
 
 
-def inside(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.bool_]:
+def inside(blocks: Ints, places: Ints) -> Mask:
     """Which places stand inside a block."""
     return places < blocks[block_of(blocks, places), 1]
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.control.arcs import CLOCKWISE, COUNTER, Point, centre_from_radius, check_closure, sweep_angle
 from ncfix.control.builder import Circles, MotionColumns
 from ncfix.control.coordinates import DEGREE, IDENTITY, PLANES, X, Y, Z
@@ -28,10 +29,6 @@ from ncfix_heidenhain.klartext.control import KlartextControl
 from ncfix_heidenhain.klartext.layout import CORNERS
 from ncfix_heidenhain.klartext.targets import arm, pole_frame
 from ncfix_heidenhain.klartext.units import FEED, RAPID, KlartextUnit
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 KINDS = {RAPID: MotionKind.RAPID, FEED: MotionKind.FEED, CLOCKWISE: MotionKind.ARC, COUNTER: MotionKind.ARC}
 PLANE = PLANES[170]
@@ -49,11 +46,11 @@ class KlartextBlockRows:
     mask    (n,) axis words, as bits; 0: the block moves nothing
     """
 
-    path: FloatArray
-    feed: FloatArray
-    motion: IntArray
-    side: IntArray
-    mask: IntArray
+    path: Array
+    feed: Array
+    motion: Ints
+    side: Ints
+    mask: Ints
 
     def head(self, count: int) -> KlartextBlockRows:
         """The first blocks of it."""
@@ -165,7 +162,7 @@ def take(control: KlartextControl, stage: KlartextBlockRows, unit: KlartextUnit,
     control.modal.compensated = int(stage.side[-1])
 
 
-def styles_of(control: KlartextControl, motion: IntArray, side: IntArray, relative: Mask) -> IntArray:
+def styles_of(control: KlartextControl, motion: Ints, side: Ints, relative: Mask) -> Ints:
     """The styles of motions whose start and end are known; `relative`: they count from where they start."""
     styles = np.empty(len(motion), dtype=np.int64)
     keys = (side << 6 | motion) << 1 | relative
@@ -177,7 +174,7 @@ def styles_of(control: KlartextControl, motion: IntArray, side: IntArray, relati
     return styles
 
 
-def keep_tangent(control: KlartextControl, path: FloatArray, circles: Circles) -> None:
+def keep_tangent(control: KlartextControl, path: Array, circles: Circles) -> None:
     """Note in which direction the last motion went that had a way."""
     ways = np.diff(path[:, :3], axis=0)
     arc = int(circles.row[-1]) if len(circles.row) else -1
@@ -209,7 +206,7 @@ class ArcBlock(NamedTuple):
 
 
 def circles_of(
-    control: KlartextControl, unit: KlartextUnit, start: int, path: FloatArray, motion: IntArray
+    control: KlartextControl, unit: KlartextUnit, start: int, path: Array, motion: Ints
 ) -> tuple[Circles, int]:
     """The circles of the arcs of a stretch that begins with a block, and how many blocks run before one it cannot take.
 
@@ -241,8 +238,8 @@ def arcs_of(
     unit: KlartextUnit,
     start: int,
     shapes: NDArray[np.int32],
-    rows: IntArray,
-    motion: IntArray,
+    rows: Ints,
+    motion: Ints,
 ) -> list[ArcBlock]:
     """What the blocks of arcs `rows` (k,) say."""
     program, lanes, first = unit.program, unit.lanes, unit.program.first_number[start + rows]
@@ -264,7 +261,7 @@ def arcs_of(
 
 def poles_of(
     control: KlartextControl, unit: KlartextUnit, start: int, shapes: NDArray[np.int32]
-) -> tuple[IntArray, tuple[FloatArray, FloatArray]]:
+) -> tuple[Ints, tuple[Array, Array]]:
     """Which blocks of a stretch set a pole (CC), and where: mm along X and Y of the program's frame."""
     slots = unit.lanes.pole[shapes]
     places = np.flatnonzero(slots[:, 0] >= 0)
@@ -314,7 +311,7 @@ class PolarArcEnds:
     path  (n + 1, 9) as in `circles_of`
     """
 
-    def __init__(self, unit: KlartextUnit, path: FloatArray, shapes: NDArray[np.int32]) -> None:
+    def __init__(self, unit: KlartextUnit, path: Array, shapes: NDArray[np.int32]) -> None:
         self.path = path
         turning = (unit.lanes.arc == "cp")[shapes]
         told = [(unit.lanes.words.axes[shapes, axis] >= 0) | turning for axis in (X, Y)] if turning.any() else []

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Ints, Mask
 from ncfix.control.interpreter import FlatLine
 from ncfix.control.moves import Moves
 from ncfix.text.language import ArcLayout, BulkLayout
@@ -21,8 +21,6 @@ from ncfix_heidenhain.klartext.interpreter import KlartextInterpreter
 from ncfix_heidenhain.klartext.layout import TURN_DEGREES, beside_corners, layout_of, uses_comma
 from ncfix_heidenhain.klartext.units import STRAIGHT
 from ncfix_heidenhain.klartext.writing import KlartextWriter, on_its_side, spelling_of
-
-Mask = NDArray[np.bool_]
 
 ARCS = frozenset({"c", "cr"})
 FEW = 1e-6
@@ -78,7 +76,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     )
 
 
-def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDArray[np.int64]) -> Mask:
+def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: Ints) -> Mask:
     """(n,) motions that `BlockWriter` has to look at.
 
     Those beside a corner that the control makes; and where rotary axes are corrected, those in which one has no word,

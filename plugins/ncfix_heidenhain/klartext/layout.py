@@ -8,8 +8,8 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Mask
 from ncfix.text.layout import AXIS_LETTERS, INCREMENT, Layout
 from ncfix.text.tree import (
     START,
@@ -166,7 +166,7 @@ def is_corner(program: Program, block: int, way: int) -> bool:
     return False
 
 
-def beside_corners(program: Program) -> NDArray[np.bool_]:
+def beside_corners(program: Program) -> Mask:
     """(n,) blocks before or behind RND or CHF: as `is_corner` says of each."""
     found = np.zeros(len(program), dtype=np.bool_)
     shapes = [_in_path(Shape(template)) for template in program.templates]
@@ -179,7 +179,7 @@ def beside_corners(program: Program) -> NDArray[np.bool_]:
     return found
 
 
-def words_alone_turn(program: Program) -> NDArray[np.bool_]:
+def words_alone_turn(program: Program) -> Mask:
     """(n,) blocks in which rotary axes get no word unless there is one for some of them.
 
     All in a program with tilted planes: the control would not keep the tip where it is. Paths that are made in a plane,

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Ints, Mask
 from ncfix.control.arcs import CLOCKWISE, COUNTER
 from ncfix.control.coordinates import INDEX, mask_of
 from ncfix.control.expressions import Fault
@@ -54,13 +55,13 @@ class KlartextLaneTables:
     pole   (s, 2) which ones are X and Y of a pole (CC); -1
     """
 
-    open: NDArray[np.bool_]
-    empty: NDArray[np.bool_]
-    side: NDArray[np.int64]
+    open: Mask
+    empty: Mask
+    side: Ints
     words: shared.LaneTables
     arc: NDArray[np.str_]
-    value: NDArray[np.int64]
-    pole: NDArray[np.int64]
+    value: Ints
+    pole: Ints
 
     @classmethod
     def of(cls, templates: Sequence[Template], plans: Sequence[KlartextPlan], axes: int) -> KlartextLaneTables:
@@ -164,7 +165,7 @@ class KlartextUnit(TextUnit[KlartextPlan]):
         """See `TextUnit.tables`."""
         return KlartextLaneTables.of(self.program.templates, self.all_plans(), self.axes)
 
-    def closed(self) -> NDArray[np.bool_]:
+    def closed(self) -> Mask:
         """See `TextUnit.closed`."""
         return ~self.lanes.open
 

@@ -12,8 +12,8 @@ import re
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array
 from ncfix.control.arcs import CLOCKWISE
 from ncfix.text.spelling import ROUNDED, Spelling, value_of
 from ncfix.text.tree import Program, Word
@@ -23,8 +23,6 @@ from ncfix_heidenhain.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc,
 from ncfix_heidenhain.klartext.control import BY_DEPTH, FROM_START
 from ncfix_heidenhain.klartext.layout import STRAIGHT, TURN_DEGREES, KlartextLayout, poles_move, uses_comma
 from ncfix_heidenhain.klartext.plans import VECTOR
-
-FloatArray = NDArray[np.float64]
 
 BY_PATH = frozenset({"c", "ct", "ctp", "cp", "lp"})
 """Functions whose meaning depends on where the tool stands or comes from, or on a pole."""
@@ -163,13 +161,13 @@ class KlartextWriter(BlockWriter):
         if layout.sense is not None:
             self._remove_span(layout.sense)
 
-    def _arc_words(self, start: FloatArray, end: FloatArray) -> None:
+    def _arc_words(self, start: Array, end: Array) -> None:
         """Arcs are written by `_first_piece`."""
 
     def _opening(self, wanted: int) -> list[str]:
         return ["LN" if self.layout.vector else "L"]
 
-    def _direction_words(self, end: FloatArray) -> list[str]:
+    def _direction_words(self, end: Array) -> list[str]:
         """TX TY TZ of a further piece; its normal is that of the block."""
         normals = [w for w in self.program.items_of(self.block) if isinstance(w, Word) and w.address[0] == "N"]
         words = [self.program.slice(self.block, word.span) for word in normals if len(word.address) == 2]
@@ -177,7 +175,7 @@ class KlartextWriter(BlockWriter):
 
     # -- arcs ---------------------------------------------------------------------------------------------------------
 
-    def _first_piece(self, position: FloatArray, end: FloatArray) -> FloatArray:
+    def _first_piece(self, position: Array, end: Array) -> Array:
         """The block itself, if it is an arc: in the words and with the pole that it needs."""
         target, layout = self.target, self.layout
         if not target.arc:
@@ -210,7 +208,7 @@ class KlartextWriter(BlockWriter):
         self.out.centre = found.centre
         return position
 
-    def _further_piece(self, position: FloatArray, piece: int) -> FloatArray:
+    def _further_piece(self, position: Array, piece: int) -> Array:
         target = self.target
         if target.arcs is None or not target.arcs[piece]:
             return super()._further_piece(position, piece)
@@ -232,7 +230,7 @@ class KlartextWriter(BlockWriter):
         self.out.centres[piece] = found.centre
         return position
 
-    def _piece_of_arc(self, begin: FloatArray, piece: int, centre: FloatArray) -> PieceOfArc:
+    def _piece_of_arc(self, begin: Array, piece: int, centre: Array) -> PieceOfArc:
         target = self.target
         word = next((word for word in self.layout.polar if word.address == "IPA"), None)
         angle = math.nan if word is None or self.layout.name != "cp" else self._value(word, math.nan)
@@ -248,7 +246,7 @@ class KlartextWriter(BlockWriter):
             decimals=target.decimals,
         )
 
-    def _as_written(self, begin: FloatArray, end: FloatArray, *, own: bool) -> FloatArray:
+    def _as_written(self, begin: Array, end: Array, *, own: bool) -> Array:
         """An end on the digits that will be written; `own`: by the words of the block itself."""
         result, decimals = end.tolist(), self.target.decimals.tolist()
         for column, letter in self.columns:

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Mask
 from ncfix.control.coordinates import INDEX, mask_of
 from ncfix.control.expressions import Evaluate, Fault
 from ncfix.control.interpreter import TextUnit
@@ -175,7 +175,7 @@ class RS274Unit(TextUnit[RS274Plan]):
             plan.lane = None
         return plan
 
-    def closed(self) -> NDArray[np.bool_]:
+    def closed(self) -> Mask:
         """See `TextUnit.closed`."""
         return np.array([plan.lane is None for plan in self.all_plans()], dtype=np.bool_)
 

@@ -6,8 +6,8 @@ from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Ints, Mask
 from ncfix.control.interpreter import FlatLine
 from ncfix.control.moves import Moves
 from ncfix.text import reach
@@ -77,7 +77,7 @@ def without(words: Mapping[str, Word], addresses: Container[str]) -> dict[str, W
     return {address: word for address, word in words.items() if address not in addresses}
 
 
-def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:
+def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: Ints) -> Mask:
     """(n,) motions for `BlockWriter`: a changed direction of the tool or angle of DC, or one that further pieces have.
 
     So are those in which DC leads past a full turn, to another number than its own. A direction that is the same, and
@@ -87,7 +87,7 @@ def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDAr
         any(word.address in VECTOR or form_of(word) == SHORTEST_WAY for word in template.words)
         for template in program.templates
     ]
-    pointed: NDArray[np.bool_] = np.array(shapes, dtype=np.bool_)[program.template[moves.block]]
+    pointed: Mask = np.array(shapes, dtype=np.bool_)[program.template[moves.block]]
     if not pointed.any():
         return pointed
     last = first_piece[1:] - 1
@@ -95,7 +95,7 @@ def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDAr
     return pointed & (turned | (np.diff(first_piece) > 1) | past_a_turn(program, moves))
 
 
-def past_a_turn(program: Program, moves: Moves) -> NDArray[np.bool_]:
+def past_a_turn(program: Program, moves: Moves) -> Mask:
     """(n,) motions in which the shortest way leads to another number than DC has."""
     found, shapes = np.zeros(len(moves), dtype=np.bool_), program.template[moves.block]
     for shape, template in enumerate(program.templates):

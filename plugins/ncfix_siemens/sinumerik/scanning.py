@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Bytes, Ints, Mask
 from ncfix.control.moves import Moves, Rule
 from ncfix.diagnostics import RefusedError
 from ncfix.text.numbers import BLANK, SIGN, fill, runs_of, table
@@ -38,12 +38,12 @@ PATH = re.compile(rb"(?im)^[ \t]*;[ \t]*\$PATH[ \t]*=")
 """The line of an archive that says where a program belongs: no comment, though it looks like one."""
 
 
-def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+def scan(source: bytes, blocks: Ints) -> Scan:
     """Find the numbers and the shape of every block."""
     return in_slices(source, blocks, scan_slice)
 
 
-def scan_slice(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+def scan_slice(source: bytes, blocks: Ints) -> Scan:
     """As `scan`, of so much that its columns do not take much room."""
     text = np.frombuffer(source, dtype=np.uint8)
     passive = list(matches(PASSIVE, source, b';"'))
@@ -58,7 +58,7 @@ def scan_slice(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     return found.setting_apart(block_of(blocks, found.spans[loose, 0]).tolist())
 
 
-def in_names(text: NDArray[np.uint8], source: bytes) -> NDArray[np.bool_]:
+def in_names(text: Bytes, source: bytes) -> Mask:
     """(n,) the digits that belong to a name of two letters or more, or to an extended address."""
     words = runs_of(NAMES[text])
     start = words[:, 0]
@@ -73,7 +73,7 @@ def in_names(text: NDArray[np.uint8], source: bytes) -> NDArray[np.bool_]:
     return named
 
 
-def extended_by_one(text: NDArray[np.uint8], places: NDArray[np.int64]) -> NDArray[np.bool_]:
+def extended_by_one(text: Bytes, places: Ints) -> Mask:
     """(n,) the equals signs right behind an address of one letter and one digit, as in ` A3=`."""
     digit, letter, before = (text[np.maximum(places - back, 0)] for back in (1, 2, 3))
     return (places > 2) & DIGIT[digit] & ADDRESS[letter] & ~LETTER[before]

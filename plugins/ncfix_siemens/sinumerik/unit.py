@@ -16,13 +16,13 @@ from collections.abc import Iterator
 from dataclasses import field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.control.coordinates import N_LETTERS
 from ncfix.control.expressions import Fault, Unknown, Value
 from ncfix.control.interpreter import TextUnit
 from ncfix.control.lanes.block_rows import words
-from ncfix.control.pointing import FloatArray, Pointing, Ways, to_each
+from ncfix.control.pointing import Pointing, Ways, to_each
 from ncfix.text.tree import Constant, Literal, Program, Word
 from ncfix.text.tree import StringLiteral as Label
 from ncfix.values import frozen, mutable
@@ -97,16 +97,16 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
         self.parameters: tuple[ProcParameter, ...] = ()
         self.saves = False
         self.directions = Directions()
-        self._vector_stops: NDArray[np.int64] | None = None
-        self._long_ways: NDArray[np.int64] | None = None
-        self._shortest: NDArray[np.int64] | None = None
-        self._vectors: NDArray[np.int64] | None = None
+        self._vector_stops: Ints | None = None
+        self._long_ways: Ints | None = None
+        self._shortest: Ints | None = None
+        self._vectors: Ints | None = None
         self._match_structures()
         self._read_procedure()
 
     # -- for the fast lane --------------------------------------------------------------------------------------------
 
-    def closed(self) -> NDArray[np.bool_]:
+    def closed(self) -> Mask:
         """See `TextUnit.closed`."""
         return np.array([plan.lane is None or plan.vector is not None for plan in self.all_plans()], dtype=np.bool_)
 
@@ -118,13 +118,13 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
             self._long_ways = np.unique(np.concatenate([*found, [self.stop]])).astype(np.int64)
         return min(super().lane_end(block), int(self._long_ways[np.searchsorted(self._long_ways, block)]))
 
-    def all_shortest(self) -> NDArray[np.int64]:
+    def all_shortest(self) -> Ints:
         """(s,) the axes that go the shortest way in blocks of each shape, as bits."""
         if self._shortest is None:
             self._shortest = np.array([plan.shortest for plan in self.all_plans()], dtype=np.int64)
         return self._shortest
 
-    def long_ways(self, letter: int) -> NDArray[np.int64]:
+    def long_ways(self, letter: int) -> Ints:
         """The blocks where an axis goes past a full turn, or beside which its words are in another form.
 
         Elsewhere the shortest way leads to the number itself, from the number of the last block that names the axis.
@@ -157,7 +157,7 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
         return int(self._vector_stops[np.searchsorted(self._vector_stops, block)])
 
     @property
-    def vectors(self) -> NDArray[np.int64]:
+    def vectors(self) -> Ints:
         """(s, 3) the slots of A3 B3 C3 in the blocks of each shape, -1 for none."""
         if self._vectors is None:
             self._vectors = np.array([plan.vector or (-1, -1, -1) for plan in self.all_plans()], dtype=np.int64)
@@ -313,7 +313,7 @@ class Directions:
         return self.ways[block - self.begin : stop - self.begin]
 
 
-def vectors_of(unit: SinumerikUnit, start: int, stop: int) -> FloatArray:
+def vectors_of(unit: SinumerikUnit, start: int, stop: int) -> Array:
     """(n, 3) the components of the vectors of blocks; zero where one is not written."""
     program = unit.program
     slots = unit.vectors[program.template[start:stop]]
@@ -321,7 +321,7 @@ def vectors_of(unit: SinumerikUnit, start: int, stop: int) -> FloatArray:
     return np.where(slots >= 0, values, 0.0)
 
 
-def ways_of(pointing: Pointing, vectors: FloatArray) -> list[Ways]:
+def ways_of(pointing: Pointing, vectors: Array) -> list[Ways]:
     """The two ways to each direction of vectors (n, 3), up to the first that has no length or is not reached."""
     x, y, z = vectors.T
     length = to_each(math.hypot, x, y, z)

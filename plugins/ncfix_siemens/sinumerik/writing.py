@@ -15,8 +15,8 @@ import re
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.control.moves import CycleCall
 from ncfix.text.layout import (
     CENTRE_LETTERS,
@@ -67,8 +67,6 @@ from ncfix_siemens.sinumerik.vocabulary import (
     VECTOR,
 )
 
-FloatArray = NDArray[np.float64]
-
 SPELLING = Spelling(vector=tuple(f"{address}=" for address in VECTOR), vector_digits=7)
 BARE = Spelling(point=False)
 OTHER_DECIMALS = 5
@@ -109,7 +107,7 @@ class SinumerikWriter(BlockWriter):
 
     # -- axes ---------------------------------------------------------------------------------------------------------
 
-    def _first_piece(self, position: FloatArray, end: FloatArray) -> FloatArray:
+    def _first_piece(self, position: Array, end: Array) -> Array:
         if not self.layout.polar:
             return super()._first_piece(position, end)
         if self._polar_stays(end):
@@ -122,13 +120,13 @@ class SinumerikWriter(BlockWriter):
             self._name_a_place(position)
         return position
 
-    def _polar_stays(self, end: FloatArray) -> bool:
+    def _polar_stays(self, end: Array) -> bool:
         if self.layout.partial_polar or self.target.code in ARCS:
             return False
         near = np.abs(end - self.target.nominal) < self.half
         return len(self.target.ends) == 1 and bool(near[self._polar_columns()].all())
 
-    def _polar_columns(self) -> NDArray[np.bool_]:
+    def _polar_columns(self) -> Mask:
         """The columns that no word of the block names while it has polar coordinates."""
         free = [column for column, letter in self.columns if letter in "XYZ" and letter not in self.layout.axes]
         return np.isin(np.arange(len(self.half)), free)
@@ -138,7 +136,7 @@ class SinumerikWriter(BlockWriter):
         formed = self.layout.forms.get(word.address) == INCREMENTAL
         return math.nan if formed else super()._meant(column, word, increment=increment)
 
-    def _arrive(self, position: FloatArray, column: int, start: float, end: float, word: Word) -> None:
+    def _arrive(self, position: Array, column: int, start: float, end: float, word: Word) -> None:
         """IC instead of DC, ACP or ACN, where that would lead a rotary axis the other way round."""
         form = self.layout.forms.get(word.address, "")
         if form not in TURNING:
@@ -167,7 +165,7 @@ class SinumerikWriter(BlockWriter):
         else:
             super()._motion_code()
 
-    def _arc_words(self, start: FloatArray, end: FloatArray) -> None:
+    def _arc_words(self, start: Array, end: Array) -> None:
         if self.target.arc and self.layout.via:
             self._via(start, end)
             return
@@ -179,7 +177,7 @@ class SinumerikWriter(BlockWriter):
         other = self.layout.angle is not None or self.layout.polar or self.target.code in TANGENTIAL
         return not other and super()._has_centre()
 
-    def _via(self, start: FloatArray, end: FloatArray) -> None:
+    def _via(self, start: Array, end: Array) -> None:
         """The intermediate point of CIP, moved as the ends are."""
         target, words = self.target, self.layout.via
         begin, finish = self._xyz(start), self._xyz(end)
@@ -235,7 +233,7 @@ class SinumerikWriter(BlockWriter):
         position[across] = target.nominal[across] + sunk
         self.out.ends.append(position)
 
-    def _placed(self, call: CycleCall, arguments: list[str] | None) -> FloatArray:
+    def _placed(self, call: CycleCall, arguments: list[str] | None) -> Array:
         """At a place that the call names: the arguments that say so and how deep."""
         target, position = self.target, self.target.start.copy()
         for column in map(target.letters.index, call.led):
@@ -255,7 +253,7 @@ class SinumerikWriter(BlockWriter):
             self.out.edits.append((*self.program.span(self.block, self.layout.cycle), text))
         return position
 
-    def _led_to(self, call: CycleCall, arguments: list[str] | None) -> FloatArray:
+    def _led_to(self, call: CycleCall, arguments: list[str] | None) -> Array:
         """Behind a motion that leads to it: the words of the motion, and the call before and behind it."""
         if arguments is not None:
             self._check(call)
@@ -283,7 +281,7 @@ class SinumerikWriter(BlockWriter):
         nominal = float(self.target.nominal[self.across])
         return isinstance(reference, float) and (nominal - reference) * (nominal + sunk - reference) <= 0.0
 
-    def _called(self, call: CycleCall, arguments: list[str] | None) -> FloatArray:
+    def _called(self, call: CycleCall, arguments: list[str] | None) -> Array:
         """Where the axes stand: the call itself, modal for a motion of its own where the hole is beside that place."""
         target, position = self.target, self.target.start.copy()
         for column, _ in self.columns:

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index, Mask
 from ncfix.certificate.expected import SLACK, Expected, PoseColumns
 from ncfix.certificate.holes import HoleCall
-from ncfix.certificate.model import LEVER, Array, Mask, Ways
+from ncfix.certificate.model import LEVER, Ways
 from ncfix.certificate.pairing import LinePair
 from ncfix.certificate.reading import Family
 from ncfix.certificate.steps import AxisStep, Kind
@@ -75,7 +75,7 @@ class Deviations(Expected):
             most += self.tolerance  # where a hole begins (R) cuts nothing
         return len(its) != 1 or not call.differs_in_depth_only(its[0], most / unit)
 
-    def gaps(self, meant: Array, done: Array, rows: NDArray[np.intp], given: PoseColumns) -> Array:
+    def gaps(self, meant: Array, done: Array, rows: Index, given: PoseColumns) -> Array:
         """How far the tip is from where it is meant to be, mm; with play, on the better side of each axis."""
         assert self.model is not None
         tcp, length, direction = given[0][rows], given[1][rows], given[2][rows]
@@ -101,8 +101,8 @@ class Deviations(Expected):
         self,
         meant: Ways,
         done: Ways,
-        owner: NDArray[np.intp],
-        inner: NDArray[np.intp],
+        owner: Index,
+        inner: Index,
         given: PoseColumns,
     ) -> Array:
         """Where on the original motions pieces end: there the expected command is nearest to the written one."""

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index, Mask
 from ncfix.certificate.families import follower_of
 from ncfix.certificate.following import Given
-from ncfix.certificate.model import Array, Mask, TipModel, Ways
+from ncfix.certificate.model import TipModel, Ways
 from ncfix.certificate.reading import AXES, TextLine
 from ncfix.certificate.steps import AxisStep, Kind, ProgramSteps
 from ncfix.certificate.text import Indices, Text
@@ -277,14 +277,14 @@ class Expected:
             found = self._halves[unit,] = self.halves(np.array([unit]), written)[0]
         return found
 
-    def control_digits(self, units: Array) -> NDArray[np.intp]:
+    def control_digits(self, units: Array) -> Index:
         """Digits behind the point that the control resolves, in blocks with units of so many mm (n,); (n, n_axes)."""
         linear, angle = self.machine.least_increment
         counted = np.where((units > 1) & self.given.decimal_inches, 10.0, units)
         least = np.where(self.machine.rotary, angle * 180 / math.pi, linear / counted[:, None])
         return np.maximum(0, np.ceil(-np.log10(least) - 1e-9)).astype(np.intp)
 
-    def halves(self, units: Array, written: NDArray[np.intp]) -> Array:
+    def halves(self, units: Array, written: Index) -> Array:
         """How far off numbers of axes are at most, with so many digits behind the point (n, n_axes).
 
         units  mm, those of the blocks (n,)

@@ -13,13 +13,13 @@ from dataclasses import field, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.certificate.formulas import value_of
 from ncfix.certificate.holes import HoleCall
 from ncfix.certificate.model import TipModel
 from ncfix.certificate.reading import AXES, JUMPS, Family, TextLine, TextWord
-from ncfix.certificate.steps import NAN, AxisStep, Floats, Kind, ModesInForce, ProgramSteps, StraightRun
+from ncfix.certificate.steps import NAN, AxisStep, Kind, ModesInForce, ProgramSteps, StraightRun
 from ncfix.certificate.text import StraightLines, Text
 from ncfix.certificate.turning import TurnedFrame
 from ncfix.values import frozen
@@ -212,7 +212,7 @@ class AxisFollower:
                 return self.turn.run(run)
         return run
 
-    def _goes_round(self, places: NDArray[np.float64]) -> bool:
+    def _goes_round(self, places: Array) -> bool:
         """Whether a rotary axis goes half a turn or more from one of places (n, n_axes) to the next."""
         turns = [column for column, axis in enumerate(self.axes) if axis in "ABC"]
         return bool((np.abs(np.diff(places[:, turns], axis=0)) >= ROUND).any())
@@ -276,7 +276,7 @@ class AxisFollower:
         self.at.update((axis, number) for axis, number in zip(self.axes, numbers, strict=True) if axis in "XYZ")
         self.unsay("XYZ")
 
-    def begin_turn(self, rotation: Floats, origin: Sequence[float] = (0.0, 0.0, 0.0), *, tilted: bool) -> None:
+    def begin_turn(self, rotation: Array, origin: Sequence[float] = (0.0, 0.0, 0.0), *, tilted: bool) -> None:
         """Coordinates are turned about the zero point, and moved to an origin (3,), mm from there.
 
         tilted  in a plane of the workpiece: then X Y Z are those of the tip
@@ -292,7 +292,7 @@ class AxisFollower:
         zero = np.array([self.offset(axis) for axis in "XYZ"])
         self._enter(TurnedFrame(self.model.columns, rotation, zero, zero + np.array(origin), tilted))
 
-    def begin_turn_about(self, rotation: Floats, centre: Mapping[str, float]) -> None:
+    def begin_turn_about(self, rotation: Array, centre: Mapping[str, float]) -> None:
         """Coordinates are turned, and the numbers of some axes stay as they are at a centre, mm."""
         self.end_turn()
         middle = np.array([centre.get(axis, 0.0) for axis in "XYZ"])
@@ -312,7 +312,7 @@ class AxisFollower:
         self.turn = turn
         self._stand_at(turn.numbers(np.array([*self.at.values()])), turn)
 
-    def _stand_at(self, place: Floats, turn: TurnedFrame) -> None:
+    def _stand_at(self, place: Array, turn: TurnedFrame) -> None:
         """The same place has these numbers (n_axes,) now; those that a turn changes the program has not said."""
         for k, axis in enumerate("XYZ"):
             number = float(place[turn.columns[k]])
@@ -332,12 +332,12 @@ class AxisFollower:
             return False
         return bool(np.abs(way.directions(here[None])[0] - self.turn.rotation[:, 2]).max() < SQUARE)
 
-    def _turns(self) -> Floats:
+    def _turns(self) -> Array:
         """Where the rotary axes stand, rad."""
         return np.radians([self.at[axis] for axis in self.axes if axis in "ABC"])
 
     def square_to(
-        self, rotation: Floats, *, sense: int = 0, sign: int = 0, inside: bool = False, stays: bool = True
+        self, rotation: Array, *, sense: int = 0, sign: int = 0, inside: bool = False, stays: bool = True
     ) -> dict[str, float]:
         """Where the rotary axes go to square the tool to a plane, degrees, as `RotaryWay.to`; NaN if not known."""
         turning = [axis for axis in self.axes if axis in "ABC"]
@@ -491,7 +491,7 @@ class AxisFollower:
         self.unsay("Z" if not self.tcp or (self.turn is not None and self.is_square()) else "XYZ")
 
 
-def _stops(flags: NDArray[np.bool_]) -> list[int]:
+def _stops(flags: Mask) -> list[int]:
     """Where the run of true ones ends in which each of them stands; of others their own index."""
     n = len(flags)
     others = np.where(flags, n, np.arange(n))

@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.certificate.steps import Kind, ProgramSteps
 from ncfix.certificate.text import Indices
 from ncfix.certificate.turning import RotaryWay
 from ncfix.machine import Machine, State
 from ncfix.values import frozen
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 FLAT = 1e-6
 LEVER = 100.0
 """mm; what a turn counts beside lengths where the nearest place of a motion is looked for, as of a table that large."""

@@ -2,8 +2,7 @@
 
 A block is proved if all its text but the numbers of its path is untouched, and the corrected motion, followed by a
 reader of its own, brings the real tip where it is meant to be: at the end to half a digit of the control, on the way
-within the tolerance. It is faulty if one of these is wrong for sure. Where this reader cannot tell, it is not proved,
-with the reason.
+within the tolerance. It is faulty if one of these is wrong for sure, and not proved where this reader cannot tell.
 """
 
 from __future__ import annotations
@@ -15,11 +14,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ncfix.arrays import Mask
 from ncfix.certificate.deviations import ASIDE, FEW, HALF_TURN, MANY, Deviations, Moved
 from ncfix.certificate.expected import SLACK, WHOLE_TURN, parts
 from ncfix.certificate.findings import BlockFault, BlockProof
 from ncfix.certificate.following import NO_CENTRE, NO_POLE, Given, positions, skips
-from ncfix.certificate.model import Mask, Ways
+from ncfix.certificate.model import Ways
 from ncfix.certificate.pairing import LinePair, LinePairs, Pairing, hole_faults, text_faults
 from ncfix.certificate.reading import Family
 from ncfix.certificate.steps import NO_CIRCLE, AxisStep, Kind

@@ -8,8 +8,8 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask, Signs
 from ncfix.certificate.reading import TextLine, TextWord
 from ncfix.certificate.text import KEPT, MOST_DIGITS, Indices, StraightLines
 from ncfix.values import mutable
@@ -20,8 +20,6 @@ PLANES = {17: ("X", "Y", "Z"), 18: ("Z", "X", "Y"), 19: ("Y", "Z", "X")}
 NO_CIRCLE = "an arc that does not close"
 AT_ONCE = 500
 """Steps that are put into columns together."""
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 
 class Kind(IntEnum):
@@ -70,7 +68,7 @@ class AxisStep:
     """Cutter radius compensation is on: the control offsets the contour."""
     by_vector: bool = False
     """The tool turns in a plane, not its axes at even rates."""
-    turn: Floats | None = None
+    turn: Array | None = None
     """(3, 3), how the coordinates of the program are turned; None: they are not."""
 
     def lead_round(
@@ -113,8 +111,8 @@ class AxisStep:
 class ModesInForce(NamedTuple):
     """What is in force in a run of lines: offsets and scales of the numbers of axes (a,), and as in `AxisStep`."""
 
-    offsets: Floats
-    scales: Floats
+    offsets: Array
+    scales: Array
     counting: bool
     tcp: bool
     length: float
@@ -122,7 +120,7 @@ class ModesInForce(NamedTuple):
     unit: float
     unsteady: bool
     by_vector: bool
-    turn: Floats | None = None
+    turn: Array | None = None
 
 
 class StraightRun(NamedTuple):
@@ -135,13 +133,13 @@ class StraightRun(NamedTuple):
     """
 
     row: int
-    rapid: Bools
-    start: Floats
-    end: Floats
-    said: Bools
-    written: NDArray[np.int8]
-    feed: Floats
-    unsaid: Bools
+    rapid: Mask
+    start: Array
+    end: Array
+    said: Mask
+    written: Signs
+    feed: Array
+    unsaid: Mask
     modes: ModesInForce
 
     @classmethod
@@ -185,7 +183,7 @@ class StraightRun(NamedTuple):
         return cls(rows[0], fast, start, end, known, written, paces, (has & ~known).any(axis=1), modes)
 
 
-def _carried(word: Indices, values: Floats, before: float) -> Floats:
+def _carried(word: Indices, values: Array, before: float) -> Array:
     """The numbers of words, each up to the next; -1: no word."""
     last = np.maximum.accumulate(np.where(word >= 0, np.arange(len(word)), -1))
     return np.where(last >= 0, values[word[last]], before)
@@ -282,7 +280,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
             if step.turn is not None:
                 self.turn[index] = self._turn_of(step.turn)
 
-    def _turn_of(self, rotation: Floats | None) -> int:
+    def _turn_of(self, rotation: Array | None) -> int:
         """Which of `rotations` one is, a new one if need be."""
         if rotation is None:
             return 0

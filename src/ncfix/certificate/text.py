@@ -16,10 +16,10 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index, Mask, Signs
 from ncfix.certificate.reading import AXES, DECIMAL, NUMBER, PATH_WORDS, READERS, Family, TextLine, TextWord
 from ncfix.values import frozen
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.signedinteger[Any]]
 PART = 4096
 """Lines that are taken apart at once."""
@@ -89,7 +89,7 @@ class Text:
         return counted and gaps <= (self.stamp is not None)
 
     @property
-    def block_numbers(self) -> NDArray[np.float64]:
+    def block_numbers(self) -> Array:
         """The numbers of the blocks that have one."""
         pattern = LEADING_NUMBER if self.family is Family.KLARTEXT else BLOCK_NUMBER
         return np.array(pattern.findall(self.source), dtype=np.float64)
@@ -241,7 +241,7 @@ class Lines(Sequence[TextLine]):
             codes = [TextWord(name, (it := digits[k]), float(it)) for name, k in shape.codes]
         return TextLine(number, words, codes, rest, block, plain=True)
 
-    def _part(self, first: int, known: dict[str, int]) -> tuple[Indices, Indices, Indices, Floats, NDArray[np.int8]]:
+    def _part(self, first: int, known: dict[str, int]) -> tuple[Indices, Indices, Indices, Array, Signs]:
         """Of lines from one on their kinds, and of their numbers the places, sizes, values and digits behind the point.
 
         known  takes in keys that are new
@@ -266,7 +266,7 @@ class Lines(Sequence[TextLine]):
             decimals[which] = np.minimum(ends[which] - points - 1, MOST_DIGITS)
         return kinds, ends - sizes, sizes, values, decimals
 
-    def _numbers(self, text: str) -> tuple[list[str], Floats]:
+    def _numbers(self, text: str) -> tuple[list[str], Array]:
         """A text cut at its numbers, which are every other piece, and their values."""
         fast, thorough = (DECIMAL_RUN, PLAIN_DECIMAL) if self.klartext else (NUMBER_RUN, PLAIN_NUMBER)
         for pattern in (fast, thorough):
@@ -280,7 +280,7 @@ class Lines(Sequence[TextLine]):
                 continue
         raise AssertionError("what these patterns match are numbers")
 
-    def are_whole(self, numbers: Indices) -> NDArray[np.bool_]:
+    def are_whole(self, numbers: Indices) -> Mask:
         """Which numbers are digits only."""
         return (self.decimals[numbers] < 0) & (self.text[self.places[numbers]] >= ord("0"))
 
@@ -290,7 +290,7 @@ class Lines(Sequence[TextLine]):
         bounds = np.searchsorted(self.kinds[order], np.arange(len(self.shapes) + 1))
         return zip(self.shapes, (order[begin:end] for begin, end in pairwise(bounds.tolist())), strict=True)
 
-    def hashes(self, lines: int, *numbers: Indices) -> NDArray[np.intp]:
+    def hashes(self, lines: int, *numbers: Indices) -> Index:
         """What so many lines have for numbers (lines,), as these are written, in one; of one number as `hash_of`."""
         found = np.zeros(lines, dtype=np.uint64)
         for each in numbers:
@@ -301,10 +301,10 @@ class Lines(Sequence[TextLine]):
             found += np.uint64(len(numbers) > 1)
         return found.view(np.intp)
 
-    def same(self, numbers: Indices, other: Lines, others: Indices) -> NDArray[np.bool_]:
+    def same(self, numbers: Indices, other: Lines, others: Indices) -> Mask:
         """Which numbers (k,) are written as those (k,) of another program."""
         sizes = self.sizes[numbers]
-        found: NDArray[np.bool_] = sizes == other.sizes[others]
+        found: Mask = sizes == other.sizes[others]
         for size in np.unique(sizes[found]).tolist():
             at = np.flatnonzero(found & (sizes == size))
             here, there = (
@@ -395,7 +395,7 @@ def hash_of(digits: str) -> int:
     return found - (found >> 63 << 64)
 
 
-def same_but_axes(first: Lines, rows: NDArray[np.intp], second: Lines, others: NDArray[np.intp]) -> NDArray[np.bool_]:
+def same_but_axes(first: Lines, rows: Index, second: Lines, others: Index) -> Mask:
     """Which plain lines (n,) have the same words and texts as others (n,), but for numbers of axes and further axes."""
     kinds, theirs = first.kinds[rows], second.kinds[others]
     codes, inverse = np.unique(kinds * len(second.shapes) + theirs, return_inverse=True)
@@ -429,11 +429,11 @@ class StraightLines(NamedTuple):
     rapid        (n,) with FMAX
     """
 
-    is_straight: NDArray[np.bool_]
+    is_straight: Mask
     word: Indices
-    counted: NDArray[np.bool_]
-    values: Floats
-    decimals: NDArray[np.int8]
+    counted: Mask
+    values: Array
+    decimals: Signs
     code: Indices
     feed: Indices
-    rapid: NDArray[np.bool_]
+    rapid: Mask

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ncfix.certificate.steps import AxisStep, Floats, StraightRun
+from ncfix.arrays import Array, Mask
+from ncfix.certificate.steps import AxisStep, StraightRun
 from ncfix.values import frozen
 
 AXIS = {"X": 0, "Y": 1, "Z": 2}
@@ -30,12 +30,12 @@ class TurnedFrame:
     """
 
     columns: tuple[int, ...]
-    rotation: Floats
-    zero: Floats
-    origin: Floats
+    rotation: Array
+    zero: Array
+    origin: Array
     tilted: bool
 
-    def commands(self, numbers: Floats) -> Floats:
+    def commands(self, numbers: Array) -> Array:
         """Numbers (k, n_axes) as commands."""
         found = numbers.copy()
         away = numbers[:, self.columns] - self.zero
@@ -45,13 +45,13 @@ class TurnedFrame:
                 found[:, column] += away[:, k] * self.rotation[row, k]  # rounded alike for one and for many
         return found
 
-    def numbers(self, command: Floats) -> Floats:
+    def numbers(self, command: Array) -> Array:
         """The inverse of `commands`, of one position (n_axes,)."""
         found, columns = command.copy(), list(self.columns)
         found[columns] = self.zero + self.rotation.T @ (command[columns] - self.origin)
         return found
 
-    def said(self, said: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def said(self, said: Mask) -> Mask:
         """Of which axes (k, n_axes) the program has said all that their commands are made of."""
         found, mixed = said.copy(), self.rotation != 0.0
         for row in range(3):
@@ -82,7 +82,7 @@ class TurnedFrame:
         )
 
 
-def about(axis: str, degrees: float) -> Floats:
+def about(axis: str, degrees: float) -> Array:
     """A right-handed turn about an axis, (3, 3)."""
     k = AXIS[axis]
     i, j = (k + 1) % 3, (k + 2) % 3
@@ -95,7 +95,7 @@ def about(axis: str, degrees: float) -> Floats:
     return found
 
 
-def turned(*turns: tuple[str, float]) -> Floats:
+def turned(*turns: tuple[str, float]) -> Array:
     """Turns about axes, degrees, each as the ones before have left it."""
     found = np.eye(3)
     for axis, degrees in turns:
@@ -111,8 +111,8 @@ class SwivelCall:
     sense     -1 or 1: the lesser or the greater angle of the axis that tilts the tool
     """
 
-    rotation: Floats
-    origin: Floats
+    rotation: Array
+    origin: Array
     sense: int
 
     @classmethod
@@ -149,7 +149,7 @@ class PlaneBlock:
     table     TABLE ROT
     """
 
-    rotation: Floats | None
+    rotation: Array | None
     positions: str
     sign: int
     table: bool
@@ -178,9 +178,9 @@ class RotaryWay:
     travel      (2, 2) rad
     """
 
-    def __init__(self, directions: Callable[[Floats], Floats], travel: Floats) -> None:
+    def __init__(self, directions: Callable[[Array], Array], travel: Array) -> None:
         self.directions, self.travel = directions, travel
-        self._known: dict[tuple[bytes, bytes], tuple[list[Floats], bool]] = {}
+        self._known: dict[tuple[bytes, bytes], tuple[list[Array], bool]] = {}
         self.outer = 0 if self._turns_about_one_line() else 1
         """Which of the two turns about a line that is fixed in the workpiece."""
 
@@ -191,7 +191,7 @@ class RotaryWay:
         lines /= np.maximum(np.linalg.norm(lines, axis=1), SAME)[:, None]
         return bool(np.abs(lines[0] - lines[1]).max() < SAME)
 
-    def to(self, wanted: Floats, here: Floats, *, sense: int, sign: int, inside: bool, stays: bool) -> Floats | None:
+    def to(self, wanted: Array, here: Array, *, sense: int, sign: int, inside: bool, stays: bool) -> Array | None:
         """Where they go from `here` (2,), rad, so that the tool points along a unit vector (3,).
 
         The nearest way. With `sense` the one with the greater (1) or lesser angle of the inner axis, with `sign` the
@@ -221,14 +221,14 @@ class RotaryWay:
             return None
         return None if not ways or any(map(_is_half_turn, ways[0] - here)) else ways[0]
 
-    def _inside(self, way: Floats, here: Floats) -> Floats | None:
+    def _inside(self, way: Array, here: Array) -> Array | None:
         """A way within the travels, each axis whole turns away and nearest to `here`."""
         turns = way[:, None] + 2 * math.pi * np.arange(-2, 3)
         good = (turns >= self.travel[:, :1] - 1e-6) & (turns <= self.travel[:, 1:] + 1e-6)
         best = np.argmin(np.where(good, np.abs(turns - here[:, None]), np.inf), axis=1)
         return turns[[0, 1], best] if good.any(axis=1).all() else None
 
-    def _ways(self, wanted: Floats, here: Floats) -> tuple[list[Floats], bool]:
+    def _ways(self, wanted: Array, here: Array) -> tuple[list[Array], bool]:
         """The ways, at most half a turn from `here`; whether the outer axis is free: then it stays."""
         grid = np.linspace(-3.0, 3.0, 5)
         at = np.vstack([here, *([[one, other] for one in grid for other in grid])])
@@ -244,7 +244,7 @@ class RotaryWay:
                 break
         good = np.abs(self.directions(at) - wanted).max(axis=1) < SAME
         at = here + (at - here + math.pi) % (2 * math.pi) - math.pi
-        found: list[Floats] = []
+        found: list[Array] = []
         for each in at[good]:
             if all(np.abs((each - other + math.pi) % (2 * math.pi) - math.pi).max() > 1e-6 for other in found):
                 found.append(each)

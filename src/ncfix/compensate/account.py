@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask
+from ncfix.arrays import Array, Index, Ints, Mask
 from ncfix.control.moves import PASS_RULES, MotionKind, Moves, Pass, Rule
 from ncfix.diagnostics import Message, Place
 from ncfix.text.tree import Program
@@ -183,7 +183,7 @@ def stretches_of(program: Program, blocks: NDArray[np.int32]) -> tuple[tuple[int
     return in_stretches(lines[np.diff(lines, prepend=-1) != 0])
 
 
-def in_stretches(lines: NDArray[np.int64]) -> tuple[tuple[int, int], ...]:
+def in_stretches(lines: Ints) -> tuple[tuple[int, int], ...]:
     """Lines in ascending order, as stretches without gaps, from and to."""
     begins = np.flatnonzero(np.diff(lines, prepend=-1) > 1)
     ends = np.append(begins[1:], len(lines)) - 1
@@ -257,7 +257,7 @@ class Account:
     rules: Mapping[int, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, moves: Moves, unchanged: NDArray[np.bool_], reasons: Mapping[int, Reason]) -> Account:
+    def of(cls, moves: Moves, unchanged: Mask, reasons: Mapping[int, Reason]) -> Account:
         """Account for the motions. A block with several motions is refused if any of them is, else passed if any is."""
         motion = moves.kind != MotionKind.DWELL
         by_rule = np.flatnonzero(motion & (moves.rule == Rule.PASS))

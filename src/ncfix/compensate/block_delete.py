@@ -15,9 +15,9 @@ from itertools import combinations, repeat
 
 import numpy as np
 
+from ncfix.arrays import Mask
 from ncfix.compensate import FixOptions
 from ncfix.compensate.account import Reason
-from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.solve import (

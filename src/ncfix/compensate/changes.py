@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ncfix.arrays import Array, Index, picked
 from ncfix.compensate.driver import Fixed, fix_flat, fix_program
 from ncfix.compensate.following import with_workpiece
-from ncfix.compensate.plan.arrays import Array, Index, picked
 from ncfix.compensate.plan.kinematics import reached_joints, signs
 from ncfix.machine import Machine, State
 from ncfix.text.writer import Edit, Splices, spliced

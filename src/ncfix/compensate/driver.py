@@ -21,6 +21,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ncfix.arrays import Mask
 from ncfix.compensate import FixOptions
 from ncfix.compensate.account import Reason
 from ncfix.compensate.block_delete import (
@@ -50,7 +51,6 @@ from ncfix.compensate.following import (
 from ncfix.compensate.parts import ContinuedPart, MachineParts, PartProof
 from ncfix.compensate.plain import PlainPlan, Planner
 from ncfix.compensate.plain_figures import figures, largest_shift, written
-from ncfix.compensate.plan.arrays import Mask
 from ncfix.compensate.plan.deviation import path_error
 from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.offset import is_offset

@@ -19,10 +19,9 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.compensate import FixOptions
-from ncfix.compensate.plan.arrays import Array, Mask
 from ncfix.compensate.plan.kinematics import commands_from_joints, joints_from_commands
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.coordinates import INCH
@@ -166,7 +165,7 @@ def with_tool_lengths(program: Program, followed: Trace, machine: Machine, setup
     return replace(known, messages=(*followed.messages, *notes), assumed=assumed)
 
 
-def _first_motions(moves: Moves, chosen: NDArray[np.bool_]) -> dict[int, int]:
+def _first_motions(moves: Moves, chosen: Mask) -> dict[int, int]:
     """Tool -> the first of the chosen motions (n,) that is made with it, in the order of the program."""
     rows = np.flatnonzero(chosen & (moves.tool >= 0))
     rows = rows[np.diff(moves.tool[rows], prepend=-1) != 0]

@@ -12,13 +12,13 @@ from functools import cached_property
 import numpy as np
 
 from ncfix import core
+from ncfix.arrays import Index, Mask, Signs
 from ncfix.compensate import FixOptions
 from ncfix.compensate.block_delete import JointPlan, Readings
 from ncfix.compensate.following import Task, refuse_stamped, resolving, with_tool_lengths, with_workpiece
-from ncfix.compensate.plan.arrays import Index, Mask
 from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.plan.kinematics import Signs, matters
+from ncfix.compensate.plan.kinematics import matters
 from ncfix.compensate.solve import Round, SelfCheckError, WrittenPlan, differences, same_rounds
 from ncfix.compensate.workers import PartCheckpoint, Read, WorkShare
 from ncfix.control.moves import MotionKind, Moves, Rule, Trace

@@ -19,10 +19,10 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix import core
+from ncfix.arrays import Array, Index, Mask, distinct, lengths, offsets, owners, picked, ranges, some
 from ncfix.compensate import FixOptions
 from ncfix.compensate.parts import ContinuedPart, Part
 from ncfix.compensate.plan.arcs import Closure, fitted, full_circles
-from ncfix.compensate.plan.arrays import Array, Index, Mask, distinct, lengths, offsets, owners, picked, ranges, some
 from ncfix.compensate.plan.deviation import CORNER, SURE, looked_at, tcp_bounds
 from ncfix.compensate.plan.ends import commands_of_positions
 from ncfix.compensate.plan.findings import Finding

@@ -13,18 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ncfix.arrays import Array, Index, Mask, batches, lengths, owners, picked, ranges, squares
 from ncfix.compensate.plain import PlainPlan
-from ncfix.compensate.plan.arrays import (
-    Array,
-    Index,
-    Mask,
-    batches,
-    lengths,
-    owners,
-    picked,
-    ranges,
-    squares,
-)
 from ncfix.compensate.plan.deviation import BATCH, STRAIGHT, errors_at, samples
 from ncfix.compensate.plan.figure_tally import FigureTally, PathError, PathSamples
 from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, bends_closely, even, features, passed

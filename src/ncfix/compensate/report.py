@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ncfix.arrays import Mask, lengths
 from ncfix.compensate import FixOptions
 from ncfix.compensate.account import Account, LeftAxis, either, joined, left_where_they_stand, said_of, without_figure
 from ncfix.compensate.block_delete import JointPlan, worst_findings
 from ncfix.compensate.following import LOOKED, Numbers, numbers_of, numbers_together
-from ncfix.compensate.plan.arrays import Mask, lengths
 from ncfix.compensate.plan.figure_tally import PathError
 from ncfix.compensate.plan.findings import Finding, Notes
 from ncfix.compensate.plan.intent import Intent

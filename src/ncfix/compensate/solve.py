@@ -21,13 +21,12 @@ from types import MappingProxyType
 
 import numpy as np
 
+from ncfix.arrays import Array, Index, Mask, Signs, every, picked
 from ncfix.compensate import FixOptions
 from ncfix.compensate.account import Lacking, Reason, at_measured_places
 from ncfix.compensate.following import kinematics_of
 from ncfix.compensate.plan.arcs import Closure, across
-from ncfix.compensate.plan.arrays import Array, Index, Mask, every, picked
 from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.plan.kinematics import Signs
 from ncfix.compensate.plan.limits import findings, increments_beyond_travel
 from ncfix.compensate.plan.path import PathTolerance, Plan, Requirements, plan
 from ncfix.compensate.plan.strategies import Strategy, get_strategy

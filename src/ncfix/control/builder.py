@@ -12,13 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.control.coordinates import INDEX, N_LETTERS, Rotation, Vector
 from ncfix.control.moves import Arc, CycleCall, Frame, MotionKind, Moves, Pass, Rule
 from ncfix.control.turns import Winding, extremes, half_turns
 from ncfix.values import mutable
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 class MotionStyle(NamedTuple):
@@ -64,11 +62,11 @@ DTYPES: dict[str, type[np.generic]] = {
 class Circles(NamedTuple):
     """The circles of k arcs in one plane, as columns of `Arc`; `row` (k,): which of some motions these are."""
 
-    row: IntArray
-    centre: FloatArray
+    row: Ints
+    centre: Array
     normal: tuple[float, float, float]
-    sweep: FloatArray
-    fixed: NDArray[np.bool_]
+    sweep: Array
+    fixed: Mask
 
 
 BUFFERED = 65536
@@ -92,7 +90,7 @@ class MotionBuilder:
         self._reasons: dict[str, int] = {"": 0}
         self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool, tuple[float, float]], int] = {}
         self._calls: dict[CycleCall, int] = {}
-        self.rolls: NDArray[np.bool_] | None = None
+        self.rolls: Mask | None = None
         self.winding: Winding | None = None
         self.clear()
 
@@ -193,7 +191,7 @@ class MotionBuilder:
         if axes:
             self._resting[self.count] = axes
 
-    def many_rest(self, axes: IntArray) -> None:
+    def many_rest(self, axes: Ints) -> None:
         """As `rests`, of many motions that are added next, (n,)."""
         rows = np.flatnonzero(axes)
         self._resting |= dict(zip((self.count + rows).tolist(), axes[rows].tolist(), strict=True))
@@ -283,7 +281,7 @@ class MotionBuilder:
             **styles,
         )
 
-    def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
+    def _style_columns(self, style: Ints) -> dict[str, NDArray[Any]]:
         """The columns of what styles hold, one row per motion."""
         rows, columns = list(self._styles), dict[str, NDArray[Any]]()
         same = rows[style[0]] if len(style) and (style == style[0]).all() else None
@@ -298,12 +296,12 @@ class MotionBuilder:
     def _keep_whole(
         self,
         styles: dict[str, NDArray[Any]],
-        programmed: NDArray[np.bool_],
-        counted: NDArray[np.bool_] | None,
-        start: FloatArray,
-        end: FloatArray,
-        block: IntArray,
-    ) -> FloatArray | None:
+        programmed: Mask,
+        counted: Mask | None,
+        start: Array,
+        end: Array,
+        block: Ints,
+    ) -> Array | None:
         """Motions in which an axis might roll over must not be split, nor their angles led to the other side.
 
         Returns the angles to which plain words lead these axes, see `Moves.angles`.
@@ -337,7 +335,7 @@ class MotionBuilder:
         angles[turning] = extremes(plain, end - offset)
         return angles
 
-    def _mask_column(self, masks: dict[int, int], otherwise: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+    def _mask_column(self, masks: dict[int, int], otherwise: Mask) -> Mask | None:
         """(n, n_axes) from bit masks of some motions, and what holds for the others (n,); None if there are none."""
         if not masks:
             return None
@@ -346,7 +344,7 @@ class MotionBuilder:
         column[list(masks)] = (np.array(list(masks.values()), dtype=np.int64)[:, None] & bits) != 0
         return column
 
-    def _arc_columns(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _arc_columns(self, count: int) -> tuple[Array, Array, Array]:
         rows, nowhere, none = list(self._arcs), np.broadcast_to(np.nan, (count, 3)), np.broadcast_to(np.nan, count)
         if not (rows or self._circles):
             return nowhere, nowhere, none
@@ -358,7 +356,7 @@ class MotionBuilder:
         return centre, normal, sweep
 
 
-def _first(block: IntArray, rows: NDArray[np.bool_], known: int | None) -> int | None:
+def _first(block: Ints, rows: Mask, known: int | None) -> int | None:
     """The block of the first of these motions, if none is known from before."""
     found = np.flatnonzero(rows)
     return int(block[found[0]]) if known is None and found.size else known
@@ -374,7 +372,7 @@ def _sparse(values: Mapping[int, Any], count: int, otherwise: float, kind: type[
     return column
 
 
-def _joined_ends(parts: Sequence[MotionColumns], columns: list[int]) -> tuple[FloatArray, FloatArray]:
+def _joined_ends(parts: Sequence[MotionColumns], columns: list[int]) -> tuple[Array, Array]:
     """Where the motions of stretches start and end; views of one path where all go on from each other, to the bit."""
     starts, ends = zip(*(part.ends(columns) for part in parts), strict=True)
     if len(parts) == 1:
@@ -400,16 +398,16 @@ class MotionColumns:
     path  (n + 1, 9) what both are views of, where each motion begins where the one before it ends
     """
 
-    block: IntArray
-    programmed: IntArray
-    style: IntArray
-    feed: FloatArray
-    start: FloatArray
-    end: FloatArray
-    unplaced: IntArray
-    path: FloatArray | None = None
+    block: Ints
+    programmed: Ints
+    style: Ints
+    feed: Array
+    start: Array
+    end: Array
+    unplaced: Ints
+    path: Array | None = None
 
-    def ends(self, columns: list[int]) -> tuple[FloatArray, FloatArray]:
+    def ends(self, columns: list[int]) -> tuple[Array, Array]:
         """Where the motions start and end, by some of the letters; views of one path where they go on."""
         if self.path is None:
             start, end = (each.take(columns, axis=1, mode="clip") for each in (self.start, self.end))

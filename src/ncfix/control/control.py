@@ -18,8 +18,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints
 from ncfix.control.builder import MotionBuilder, MotionStyle
 from ncfix.control.coordinates import LETTERS, Vector, mask_of, rotated
 from ncfix.control.flow import BlockBudget
@@ -385,9 +385,7 @@ class ProgramControl(ControlState):
         across = still & ~plane if self.at_corner else 0
         return across | (plane if beside and plane & ~still == 0 else 0)
 
-    def resting_of_many(
-        self, words: NDArray[np.int64], starts: NDArray[np.float64], ends: NDArray[np.float64]
-    ) -> NDArray[np.int64]:
+    def resting_of_many(self, words: Ints, starts: Array, ends: Array) -> Ints:
         """As `_resting`, of motions with `words` (n,) from `starts` to `ends` (n, 9), in coordinates not turned."""
         columns = list(self.modal.plane.pair)
         still = (np.abs(ends[:, columns] - starts[:, columns]) <= NO_WAY).all(axis=1)

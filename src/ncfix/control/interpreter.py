@@ -19,8 +19,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Ints, Mask
 from ncfix.control.control import ProgramControl
 from ncfix.control.expressions import Fault
 from ncfix.control.flow import ENDLESS, NEVER_ENDS, Recurrence
@@ -76,7 +76,7 @@ class TextUnit(ABC, Generic[P]):
         self.operations: dict[int, Any] = {}
         self.ahead = Lookahead()
         self._lanes: Any = None
-        self._stops: NDArray[np.int64] | None = None
+        self._stops: Ints | None = None
 
     def plan(self, block: int) -> P:
         """What a block does."""
@@ -111,7 +111,7 @@ class TextUnit(ABC, Generic[P]):
         return self._lanes
 
     @abstractmethod
-    def closed(self) -> NDArray[np.bool_]:
+    def closed(self) -> Mask:
         """(s,) shapes that cannot go through the fast lane."""
 
     def tables(self) -> Any:

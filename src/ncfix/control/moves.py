@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask, Signs
 from ncfix.control.coordinates import LETTERS, Vector
 from ncfix.control.pointing import Pointing
 from ncfix.diagnostics import Message
@@ -101,8 +102,8 @@ class Frame:
               number with one: 0.001 where the control counts least increments in such words
     """
 
-    offset: NDArray[np.float64]
-    rotation: NDArray[np.float64]
+    offset: Array
+    rotation: Array
     unit: float
     diameter: bool = False
     increments: tuple[float, float] = (1.0, 1.0)
@@ -192,75 +193,75 @@ class Moves:
     """
 
     axes: tuple[str, ...]
-    rotary: NDArray[np.bool_]
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
-    programmed: NDArray[np.bool_]
-    kind: NDArray[np.int8]
-    rule: NDArray[np.int8]
+    rotary: Mask
+    start: Array
+    end: Array
+    programmed: Mask
+    kind: Signs
+    rule: Signs
     reason: NDArray[np.int16]
     block: NDArray[np.int32]
     frame: NDArray[np.int32]
-    incremental: NDArray[np.bool_]
-    arc_absolute: NDArray[np.bool_]
-    tcp: NDArray[np.bool_]
-    compensated: NDArray[np.bool_]
+    incremental: Mask
+    arc_absolute: Mask
+    tcp: Mask
+    compensated: Mask
     tool: NDArray[np.int32]
-    tool_length: NDArray[np.float64]
-    feed: NDArray[np.float64]
-    feed_mode: NDArray[np.int8]
-    centre: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    sweep: NDArray[np.float64]
+    tool_length: Array
+    feed: Array
+    feed_mode: Signs
+    centre: Array
+    normal: Array
+    sweep: Array
     modal: NDArray[np.int16]
     frames: tuple[Frame, ...]
     reasons: tuple[str, ...]
-    rotary_as_programmed: NDArray[np.bool_] | None = None
+    rotary_as_programmed: Mask | None = None
     pointing: Pointing | None = None
-    approach: NDArray[np.float64] | None = None
-    placed: NDArray[np.bool_] | None = None
-    fixed_centre: NDArray[np.bool_] | None = None
-    counted: NDArray[np.bool_] | None = None
-    measured: NDArray[np.bool_] | None = None
-    resting: NDArray[np.bool_] | None = None
-    angles: NDArray[np.float64] | None = None
-    passing: NDArray[np.int8] | None = None
-    beside: NDArray[np.float64] | None = None
-    across: NDArray[np.int8] | None = None
+    approach: Array | None = None
+    placed: Mask | None = None
+    fixed_centre: Mask | None = None
+    counted: Mask | None = None
+    measured: Mask | None = None
+    resting: Mask | None = None
+    angles: Array | None = None
+    passing: Signs | None = None
+    beside: Array | None = None
+    across: Signs | None = None
     call: NDArray[np.int32] | None = None
     calls: tuple[CycleCall, ...] = ()
-    spelled: NDArray[np.bool_] | None = None
-    tcp_length: NDArray[np.float64] | None = None
-    exact_stop: NDArray[np.bool_] | None = None
-    words_alone_turn: NDArray[np.bool_] | None = None
+    spelled: Mask | None = None
+    tcp_length: Array | None = None
+    exact_stop: Mask | None = None
+    words_alone_turn: Mask | None = None
 
     def __len__(self) -> int:
         return len(self.block)
 
     @property
-    def length_under_tcp(self) -> NDArray[np.float64]:
+    def length_under_tcp(self) -> Array:
         """(n,) mm, the length of tool that the control has X Y Z of under TCP."""
         own = self.tcp_length
         return self.tool_length if own is None else np.where(np.isnan(own), self.tool_length, own)
 
     @property
-    def beside_tip(self) -> NDArray[np.bool_]:
+    def beside_tip(self) -> Mask:
         """(n,) X Y Z are those of another point than the tip, though TCP is on."""
         return np.zeros(len(self), dtype=bool) if self.tcp_length is None else self.tcp & ~np.isnan(self.tcp_length)
 
     @property
-    def wordless(self) -> NDArray[np.bool_]:
+    def wordless(self) -> Mask:
         """(n, n_axes) axes that have no word, and must get none: nobody knows but the machine where they stand.
 
         Those that rest have one, which must lead them nowhere else.
         """
-        wordless: NDArray[np.bool_] = np.zeros(self.end.shape, dtype=bool)
+        wordless: Mask = np.zeros(self.end.shape, dtype=bool)
         if self.placed is not None:
             wordless = ~(self.placed | self.programmed)
         return wordless if self.resting is None else wordless | self.resting
 
     @property
-    def idle(self) -> NDArray[np.bool_]:
+    def idle(self) -> Mask:
         """(n, n_axes) axes that no correction moves: those without words, and rotary axes that get none here."""
         if self.words_alone_turn is None:
             return self.wordless
@@ -268,13 +269,13 @@ class Moves:
         return self.wordless | (self.rotary & rests[:, None])
 
     @property
-    def increments(self) -> NDArray[np.bool_]:
+    def increments(self) -> Mask:
         """(n, n_axes) axes along which a motion makes the same way wherever it starts."""
         counted = self.incremental[:, None] if self.counted is None else self.counted
         return np.broadcast_to(counted & (self.rule != Rule.PASS)[:, None], self.end.shape)
 
     @property
-    def about_fixed_point(self) -> NDArray[np.bool_]:
+    def about_fixed_point(self) -> Mask:
         """(n,) arcs whose centre is where a word says, wherever they start."""
         if self.fixed_centre is None:
             return self.arc_absolute
@@ -284,7 +285,7 @@ class Moves:
         """The call with which the cycle of a motion is called, if that has a block of its own."""
         return None if self.call is None or self.call[row] < 0 else self.calls[self.call[row]]
 
-    def refused(self, rows: NDArray[np.bool_], why: str) -> Moves:
+    def refused(self, rows: Mask, why: str) -> Moves:
         """The motions with those of `rows` (n,) refused that would be corrected."""
         rows = rows & (self.rule == Rule.CORRECT)
         if not rows.any():
@@ -295,14 +296,14 @@ class Moves:
         return replace(self, rule=rule, reason=reason, reasons=reasons)
 
     @property
-    def cutting(self) -> NDArray[np.bool_]:
+    def cutting(self) -> Mask:
         """(n,) motions at feed: straight ones, arcs and canned cycles, but for what is passed by rule."""
         return (self.kind != MotionKind.RAPID) & (self.kind != MotionKind.DWELL) & (self.rule != Rule.PASS)
 
     @property
-    def moved(self) -> NDArray[np.bool_]:
+    def moved(self) -> Mask:
         """(n, n_axes) axes that a motion takes to its end; a reference point without words takes all of them."""
-        moved: NDArray[np.bool_] = self.programmed | (self.end != self.start)
+        moved: Mask = self.programmed | (self.end != self.start)
         passed = np.flatnonzero((self.rule == Rule.PASS) & (self.kind != MotionKind.DWELL))
         moved[passed[~self.programmed[passed].any(axis=1)]] = True
         return moved

@@ -17,19 +17,17 @@ from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.control.coordinates import TURN
 from ncfix.values import frozen
 
-FloatArray = NDArray[np.float64]
-
-Columns = tuple[FloatArray, FloatArray, FloatArray]
+Columns = tuple[Array, Array, Array]
 
 Ways = tuple[tuple[float, float], tuple[float, float]]
 """Two ways to point the tool, of which `nearest` takes one: angles of outer and inner axis, rad."""
 
-Directions = Callable[[float, float], FloatArray]
+Directions = Callable[[float, float], Array]
 """Angles of the two rotary axes, rad -> the unit vector (3,) from the tip to the spindle in the workpiece."""
 
 PROBES = (0.0, 0.7, 1.3, -0.9)
@@ -64,15 +62,15 @@ class Pointing:
                 return found
         return None
 
-    def at(self, outer: float, inner: float) -> FloatArray:
+    def at(self, outer: float, inner: float) -> Array:
         """The direction (3,) at these angles, rad."""
         return np.array(turned(self.lines[0], outer, turned(self.lines[1], inner, self.lines[2], to_one), to_one))
 
-    def direction(self, position: FloatArray) -> FloatArray:
+    def direction(self, position: Array) -> Array:
         """The direction (3,) at a position (n_axes,), rad."""
         return self.at(float(position[self.columns[0]]), float(position[self.columns[1]]))
 
-    def angles(self, direction: FloatArray, near: tuple[float, float]) -> list[tuple[float, float]]:
+    def angles(self, direction: Array, near: tuple[float, float]) -> list[tuple[float, float]]:
         """The angles of outer and inner axis, rad, with which the tool points along a unit vector.
 
         Nearest to `near` first; an axis that may stand anywhere stands there. Empty if the machine cannot point there.
@@ -83,14 +81,14 @@ class Pointing:
         first, second = nearest(ways, near)
         return [first] if first == second else [first, second]
 
-    def ways_of_many(self, directions: Columns) -> tuple[NDArray[np.bool_], list[Ways]]:
+    def ways_of_many(self, directions: Columns) -> tuple[Mask, list[Ways]]:
         """Whether the machine can point along unit vectors, three columns (n,), and the two `Ways` to do it."""
         outer, inner, tool = ((np.array(x), np.array(y), np.array(z)) for x, y, z in self.lines)
         beyond, ways = solve((outer, inner, tool), directions, to_each)
         first, second = (zip(one.tolist(), other.tolist(), strict=True) for one, other in ways)
         return beyond <= 0, list(zip(first, second, strict=True))
 
-    def at_pole(self, direction: FloatArray) -> bool:
+    def at_pole(self, direction: Array) -> bool:
         """Whether a tool along the unit vector `direction` (3,) would stand along the line of the outer axis."""
         return math.hypot(*cross(self.lines[0], _triple(direction))) < POLE
 
@@ -110,12 +108,12 @@ def _swapped(directions: Directions) -> Directions:
     return lambda a, b: directions(b, a)
 
 
-def _triple(vector: FloatArray) -> Triple:
+def _triple(vector: Array) -> Triple:
     x, y, z = vector.tolist()
     return x, y, z
 
 
-def _line(directions: Directions, probes: tuple[float, ...] = PROBES) -> FloatArray | None:
+def _line(directions: Directions, probes: tuple[float, ...] = PROBES) -> Array | None:
     """The line about which the first angle turns, the same wherever the second stands; None if it is not."""
     lines = [line for probe in probes if (line := _line_at(directions, probe)) is not None]
     if not lines or any(np.abs(line - lines[0]).max() > SAME for line in lines):
@@ -123,14 +121,14 @@ def _line(directions: Directions, probes: tuple[float, ...] = PROBES) -> FloatAr
     return lines[0]
 
 
-def _line_at(directions: Directions, second: float) -> FloatArray | None:
+def _line_at(directions: Directions, second: float) -> Array | None:
     points = [directions(angle, second) for angle in (0.0, math.pi / 2, math.pi)]
     normal = np.cross(points[1] - points[0], points[2] - points[1])
     size = float(np.linalg.norm(normal))
     return normal / size if size > LEAST**2 else None
 
 
-Number = TypeVar("Number", float, FloatArray)
+Number = TypeVar("Number", float, Array)
 """A number, or a column of them (n,), one per direction."""
 
 Vector = tuple[Number, Number, Number]
@@ -154,7 +152,7 @@ def to_one(function: Callable[..., float], *values: float) -> float:
     return function(*values)
 
 
-def to_each(function: Callable[..., float], *values: FloatArray) -> FloatArray:
+def to_each(function: Callable[..., float], *values: Array) -> Array:
     """Apply a function of numbers to columns of one shape."""
     found = list(map(function, *(each.ravel().tolist() for each in values)))
     return np.array(found, dtype=np.float64).reshape(values[0].shape)

@@ -17,9 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.control.coordinates import Rotation, Vector, X, Y, Z, angles_in_words, as_rotation
 from ncfix.control.moves import Kinematics, TcpState
-from ncfix.control.pointing import FloatArray, Pair, Pointing, Triple
+from ncfix.control.pointing import Pair, Pointing, Triple
 from ncfix.values import frozen
 
 PROBE = 128.0
@@ -127,7 +128,7 @@ class MachinePosture:
         if self.kinematics is None or len(turning) != 2 or not {X, Y, Z} <= {*self.axis_indices}:
             return None
 
-        def directions(first: float, second: float) -> FloatArray:
+        def directions(first: float, second: float) -> Array:
             position = [0.0] * len(self.rotary)
             position[turning[0]], position[turning[1]] = first, second
             return (self._tip(position, 0.0) - self._tip(position, PROBE)) / PROBE
@@ -185,7 +186,7 @@ class MachinePosture:
             self._directions = still, found
         return self._directions[1]
 
-    def _tip(self, position: Vector, length: float) -> FloatArray:
+    def _tip(self, position: Vector, length: float) -> Array:
         """The tip (3,) of a tool of some length in the workpiece, mm."""
         assert self.kinematics is not None
         command = [position[index] for index in self.axis_indices]
@@ -215,7 +216,7 @@ def normal_of(frame: Rotation) -> Triple:
     return frame[0][2], frame[1][2], frame[2][2]
 
 
-def _unit(vector: FloatArray) -> list[float]:
+def _unit(vector: Array) -> list[float]:
     """A vector as one of length one."""
     parts: list[float] = vector.tolist()
     size = math.hypot(*parts)

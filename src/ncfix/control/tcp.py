@@ -15,8 +15,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.control.coordinates import Vector, X, Y, Z
 from ncfix.control.moves import Kinematics, MotionEnd, Moves, Rule, TcpState
 
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from ncfix.control.moves import UnknownAxes
     from ncfix.control.state import ControlState
 
-
-FloatArray = NDArray[np.float64]
 
 MACHINE = TcpState(False, 0.0)
 
@@ -111,7 +109,7 @@ def switch(control: ControlState, tool: Vector, on: bool, number: int | None) ->
     control.tcp = on
 
 
-def renamed(moves: Moves, row: int, position: FloatArray, kinematics: Kinematics | None) -> FloatArray | None:
+def renamed(moves: Moves, row: int, position: Array, kinematics: Kinematics | None) -> Array | None:
     """The command (n_axes,) at which a motion starts, if nothing but TCP or a tool length in it has changed before it.
 
     position  (n_axes,) the command at the end of the motion before, as written
@@ -128,7 +126,7 @@ def renamed(moves: Moves, row: int, position: FloatArray, kinematics: Kinematics
     return np.array(kinematics(position.tolist(), before, after))
 
 
-def passed_through(moves: Moves, row: int, position: FloatArray, kinematics: Kinematics | None) -> FloatArray | None:
+def passed_through(moves: Moves, row: int, position: Array, kinematics: Kinematics | None) -> Array | None:
     """The command (n_axes,) at the end of a motion in machine coordinates that is left as it is, under TCP.
 
     Axes of the machine that it moves go where they do anyway, the others stand where `position` (n_axes,) has them: the
@@ -155,7 +153,7 @@ def _state(moves: Moves, row: int) -> TcpState:
     return TcpState(on, float(moves.length_under_tcp[row]) if on else 0.0)
 
 
-def jumps(moves: Moves) -> NDArray[np.bool_]:
+def jumps(moves: Moves) -> Mask:
     """(n, n_axes) where a motion does not start where the one before ended.
 
     Where tool-centre-point control goes on or off, or has another length, linear axes stand elsewhere as soon as the

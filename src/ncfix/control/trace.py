@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index, Mask
 from ncfix.control.control import ProgramControl
 from ncfix.control.interpreter import FollowedLanguage, Interpreter
 from ncfix.control.moves import Kinematics, MotionKind, Moves, Rule, Trace
@@ -194,7 +195,7 @@ def last_of(program: Program, moves: Moves) -> tuple[Program, Moves]:
     return alone, replace(motion, block=motion.block - np.int32(block))
 
 
-def taken(moves: Moves, rows: NDArray[np.intp]) -> Moves:
+def taken(moves: Moves, rows: Index) -> Moves:
     """Motions `rows` (k,) alone."""
     columns = ((each.name, getattr(moves, each.name)) for each in fields(Moves) if each.name not in TABLES)
     return replace(moves, **{name: column.take(rows, axis=0) for name, column in columns if column is not None})
@@ -292,7 +293,7 @@ class Follower:
         modal.cycle.initial = None
         self.control.take_variables(state.variables)
 
-    def stand(self, position: NDArray[np.float64]) -> None:
+    def stand(self, position: Array) -> None:
         """Take the axes to a command (n_axes,), mm and rad, where the corrected program has left them."""
         self.control.position = list(self.control.position)
         for column, value in zip(self.control.builder.columns, position.tolist(), strict=True):
@@ -329,7 +330,7 @@ def check_reach(program: Program, moves: Moves) -> None:
         raise SourceError.of(TOO_FAR, text, program.place(int(moves.block[rows[0]])), "check the numbers of the block")
 
 
-def _are_far(places: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _are_far(places: Array) -> Mask:
     """(n,) which of (n, k) places are too far away."""
     rows = np.zeros(len(places), dtype=np.bool_)
     if not places.size or max(places.max(), -places.min()) <= FAR:

@@ -23,12 +23,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index, Mask
 from ncfix.control.moves import FeedMode, MotionKind, Moves
 from ncfix.values import mutable
-
-FloatArray = NDArray[np.float64]
 
 UNTIMED = (
     "rotary axes turn alone, and the time that takes is not known: their feed is no plain number, or was not given"
@@ -36,9 +34,9 @@ UNTIMED = (
 )
 
 
-def turns_alone(moves: Moves) -> NDArray[np.bool_]:
+def turns_alone(moves: Moves) -> Mask:
     """(n,) motions at feed in which rotary axes move and no linear axis does: those whose `turn_alone` is not 0."""
-    alone: NDArray[np.bool_] = moves.kind == MotionKind.FEED
+    alone: Mask = moves.kind == MotionKind.FEED
     for column in np.flatnonzero(~moves.rotary):
         alone &= moves.end[:, column] - moves.start[:, column] == 0
     rows = np.flatnonzero(alone)
@@ -71,8 +69,6 @@ def minutes(moves: Moves, row: int) -> float:
     return turn / feed if mode == FeedMode.PER_MINUTE and feed > 0 else float("inf")
 
 
-Mask = NDArray[np.bool_]
-
 ROLLS = "NCF247"
 HALF_A_TURN = math.pi * (1 - 1e-9)
 BESIDE = math.radians(0.5)
@@ -98,7 +94,7 @@ def may_roll(travel: Sequence[tuple[float, float]] | None, rotary: Mask) -> Mask
     return rolls if rolls.any() else None
 
 
-def half_turns(directed: Mask, start: FloatArray, end: FloatArray) -> tuple[Mask, Mask] | None:
+def half_turns(directed: Mask, start: Array, end: Array) -> tuple[Mask, Mask] | None:
     """Motions (n,) that turn an axis by half a turn or more, and those about half a turn long; None: there are none.
 
     A correction of the angle might turn the latter round; those before them count as such, too.
@@ -123,7 +119,7 @@ class Winding:
 
     wound: Mask
 
-    def back(self, turning: NDArray[np.intp], plain: Mask, start: FloatArray, end: FloatArray) -> Mask:
+    def back(self, turning: Index, plain: Mask, start: Array, end: Array) -> Mask:
         """Motions (n,) whose plain words bring an axis back from beyond 0 and 360 degrees.
 
         turning     (k,) the axes that may roll over
@@ -146,7 +142,7 @@ class Winding:
         return found
 
 
-def extremes(plain: Mask, end: FloatArray) -> FloatArray:
+def extremes(plain: Mask, end: Array) -> Array:
     """The smallest and the largest angle (k, 2), rad, to which plain words lead axes; 0 is one of them.
 
     plain  (n, k) axes with such words

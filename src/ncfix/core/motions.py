@@ -238,7 +238,7 @@ def bounds(
     """What the deviation of the tip from pose to pose (n + 1, axes) does not exceed: as `deviation.straight_bounds`.
 
     linear              1 for a linear axis, 0 for others
-    slopes, curvatures  (2, axes) of `bow.Bow`
+    slopes, curvatures  (2, axes) of `DeviationBounds`
     moved, turned       its `shift` and `turn`
     least_arm           the arm with all axes at zero, mm
     more, corner        a factor for products of errors, and `deviation.CORNER`

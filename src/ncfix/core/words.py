@@ -32,7 +32,7 @@ ROOM = 16 + MOST_STEPS + 4
 
 
 class NumberRules:
-    """Numbers as `text.number_text` has them.
+    """Numbers as `ncfix.text.numbers` and `ncfix.text.spelling` have them.
 
     powers           of ten
     longest          bytes, but for its sign, of the longest number that is rewritten here
@@ -53,9 +53,9 @@ class WordPrinter:
     """Writes motions of a program into a buffer.
 
     text       of the program
-    blocks     of the program: `edges` (n, 2) their spans, `first` number and `template` of each
-    numbers    of the program: `values` and `spans`
-    layouts    `slots`, `by_place`, `by_letter`, `anchors`, `heads`, `leads`, `openings`, `closings` of `Layouts`
+    edges, first, template  (n, 2) spans of its blocks, and the first number and the template of each
+    values, spans  of the numbers of the program
+    slots, by_place, by_letter, anchors, heads, leads, openings, closings  see `writer.bulk_layouts.Layouts`
     line_end   the end of a line
     offset     and `scale` (axes,): a command is `offset + scale * number`
     least      (axes,) decimals that the least increment needs

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtrc
 
+from ncfix.arrays import Array
 from ncfix.diagnosis.noise import ENOUGH_REPEATS, repeat_scatter, states
 from ncfix.diagnosis.residual_data import ResidualData, misfit
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
 from ncfix.machine.plausible import much
 from ncfix.measure.estimate import Problem
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.measurement import Measurement
 from ncfix.measure.selection import Selection
 
 SPARE = 12

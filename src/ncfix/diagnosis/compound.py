@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnosis.assessment import Plausibility
 from ncfix.diagnosis.catalogue import Candidate
 from ncfix.diagnosis.constants import MovedConstant
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.machine import Effect
 from ncfix.machine.basis import Polynomial
-from ncfix.measure.measurement import Array
 from ncfix.values import frozen
 
 LIKE = 0.25

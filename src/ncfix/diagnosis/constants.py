@@ -20,13 +20,12 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import chdtrc, logsumexp
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.diagnosis.effect_form import side_by_side
 from ncfix.diagnosis.evidence import FURTHER, SURE, Evidence, Member, marginal
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.machine.effects import Unit, units
 from ncfix.measure.least_squares import Combination, Solution, orthonormal, solve, without
-from ncfix.measure.measurement import Array, Index
-from ncfix.measure.observation import Mask
 from ncfix.measure.selection import Selection
 from ncfix.values import frozen
 
@@ -308,7 +307,7 @@ def names_of(selection: Selection) -> list[str]:
     return [name if names.count(name) == 1 else label for name, label in zip(names, selection.labels, strict=True)]
 
 
-def _gained(inner: Array, seen: Array, places: Index) -> float:
+def _gained(inner: Array, seen: Array, places: Ints) -> float:
     """Squares that these constants explain."""
     own = seen[places]
     return float(own @ np.linalg.solve(inner[np.ix_(places, places)], own)) if len(places) else 0.0
@@ -353,7 +352,7 @@ def _own(
     return with_all - less - float(np.log(max(len(offered), 1))), tuple(alike)
 
 
-def _renumbered(found: Solution, order: Index) -> Solution:
+def _renumbered(found: Solution, order: Ints) -> Solution:
     """A solution whose columns were in another order; `order` says which is which."""
     change = np.zeros(len(order))
     change[order] = found.change

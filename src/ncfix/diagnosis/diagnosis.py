@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.diagnosis import checks
 from ncfix.diagnosis.assessment import plausibility
 from ncfix.diagnosis.catalogue import Candidate, catalogue, without
@@ -65,7 +65,7 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import component_title
 from ncfix.measure.least_squares import orthonormal
 from ncfix.measure.least_squares import without as without_base
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.measurement import Measurement
 from ncfix.values import frozen
 
 NOTHING, FOUND, AMBIGUOUS, UNKNOWN = "nothing-missing", "found", "ambiguous", "unknown-effect"
@@ -98,10 +98,10 @@ class Case:
     considered: int
     unheard_of: tuple[str, ...]
     invisible: tuple[tuple[str, float], ...]
-    outlying: NDArray[np.bool_]
+    outlying: Mask
 
     @property
-    def kept(self) -> NDArray[np.bool_]:
+    def kept(self) -> Mask:
         """(m,) values of rows that were not put aside."""
         return ~self.outlying[np.maximum(self.data.row, 0)] & (self.data.row >= 0)
 

@@ -13,12 +13,13 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import ndtr
 
+from ncfix.arrays import Array
 from ncfix.diagnosis.effect_form import EffectForm
 from ncfix.diagnosis.evidence import Evidence
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.diagnosis.selection import ALIKE
 from ncfix.measure.instruments import observe
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.measurement import Measurement
 from ncfix.measure.observation import Observation
 from ncfix.values import frozen
 

@@ -13,12 +13,12 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints
 from ncfix.diagnosis.catalogue import Candidate
-from ncfix.measure.measurement import Array, Index
 from ncfix.values import frozen
 
 Real = TypeVar("Real", np.float32, np.float64)
-Blocks = list[tuple[Index, Index, Array]]
+Blocks = list[tuple[Ints, Ints, Array]]
 """For each width: numbers of the groups, their columns (g, w), their inner products (g, w, w)."""
 
 

@@ -41,11 +41,11 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
+from ncfix.arrays import Array
 from ncfix.diagnosis.effect_form import Blocks, EffectForm, block_odds, blocks_of
 from ncfix.diagnosis.forms import shape_variations
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse
-from ncfix.measure.measurement import Array
 from ncfix.values import frozen, mutable
 
 SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)

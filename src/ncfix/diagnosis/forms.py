@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Array
 from ncfix.diagnosis.catalogue import Candidate
 from ncfix.diagnosis.catalogue.candidate import (
     LETTERS,
@@ -45,7 +46,6 @@ from ncfix.machine import Effect
 from ncfix.machine.axes import SPINDLE, Axis, component_title
 from ncfix.machine.basis import Backlash, Fourier, Polynomial
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array
 from ncfix.measure.observation import Observation, base_from_workpiece
 from ncfix.values import frozen
 

@@ -12,8 +12,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.diagnosis.effect_form import EffectForm
 from ncfix.diagnosis.evidence import Background, Comparison, Evidence, Member
 from ncfix.diagnosis.forms import scaled_axes
@@ -23,10 +23,8 @@ from ncfix.diagnosis.selection import Selected, with_alternatives
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Basis, Fourier, Polynomial
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array, Index
 from ncfix.values import frozen
 
-Mask = NDArray[np.bool_]
 WIDE = 1e3
 """um: how far a constant of the machine file may be off; wide enough to be no prior, and what cannot be seen stays."""
 TRACE = 1e-12
@@ -170,7 +168,7 @@ class HeldOut:
     without: Array
     with_all: Array
     less: tuple[Array, ...]
-    cell: Index
+    cell: Ints
 
 
 def held_out_as_given(evidence: Evidence, from_file: Array, setup: Array, share: float) -> Array:
@@ -183,7 +181,7 @@ def held_out_as_given(evidence: Evidence, from_file: Array, setup: Array, share:
     return _predicted(background, from_file, columns, share, _folds(background.data)[1])
 
 
-def _folds(data: ResidualData) -> tuple[Index, list[NDArray[np.bool_]]]:
+def _folds(data: ResidualData) -> tuple[Ints, list[Mask]]:
     """The region of each value, (m,), and which values are held out in turn."""
     cell = pose_regions(scaled_axes(data))[np.maximum(data.row, 0)]
     return cell, [(cell % FOLDS == fold) & (data.row >= 0) for fold in range(FOLDS)]
@@ -217,9 +215,7 @@ def held_out(evidence: Evidence, members: Sequence[Member], share: float) -> Hel
     return HeldOut(errors[0], errors[1], tuple(errors[2:]), cell)
 
 
-def _predicted(
-    background: Background, y: Array, signal: Array, share: float, tests: Sequence[NDArray[np.bool_]]
-) -> Array:
+def _predicted(background: Background, y: Array, signal: Array, share: float, tests: Sequence[Mask]) -> Array:
     """Errors of the predictions of each fold of values y from the others, for a signal whose columns are there at
     unit size.
 
@@ -243,7 +239,7 @@ def _predicted(
     return error
 
 
-def pose_regions(u: Array, count: int = REGIONS) -> Index:
+def pose_regions(u: Array, count: int = REGIONS) -> Ints:
     """Regions (n,) of poses u (n, k), with equally many rows: halved at the median of the widest way over and over."""
     label = np.zeros(len(u), dtype=np.int64)
     for _ in range(int(np.log2(count))):

@@ -15,17 +15,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from ncfix.arrays import Array, Mask
 from ncfix.diagnosis.discrimination import Hypothesis, HypothesisPairs, chance, exchanged, seen_at, worst
 from ncfix.diagnosis.effect_form import EffectForm
 from ncfix.diagnosis.evidence import Comparison, Evidence, Members
-from ncfix.diagnosis.joint_fit import Mask
 from ncfix.diagnosis.preposterior import prospect
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.diagnosis.selection import Selected, aliases
 from ncfix.machine import Machine
 from ncfix.machine.state import SUM
 from ncfix.measure.candidates import Room, candidates
-from ncfix.measure.measurement import STATES, Array, Measurement
+from ncfix.measure.measurement import STATES, Measurement
 from ncfix.values import frozen
 
 NEAR = 10.0

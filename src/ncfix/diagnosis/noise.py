@@ -23,10 +23,10 @@ from dataclasses import field
 from itertools import islice, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky, eigh, qr, solve_triangular
 from scipy.special import chdtrc, fdtrc
 
+from ncfix.arrays import Array, Mask
 from ncfix.diagnosis.effect_form import Blocks, EffectForm, block_odds, blocks_of, column_bounds, side_by_side
 from ncfix.diagnosis.evidence import (
     MISSHAPEN,
@@ -41,7 +41,7 @@ from ncfix.diagnosis.evidence import (
 from ncfix.diagnosis.forms import shape_variations, without_lacking_constants
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import inverse, orthonormal
-from ncfix.measure.measurement import Array, Measurement, groups
+from ncfix.measure.measurement import Measurement, groups
 from ncfix.values import frozen
 
 DRIFT_SIZES = (0.0, 0.15, 0.35, 0.7)
@@ -273,9 +273,7 @@ def _taken(weighed: Array, columns: Array) -> Array:
     return np.asarray(solve_triangular(factor, weighed.T, lower=True, check_finite=False).T)
 
 
-def downweighted(
-    data: ResidualData, everything: Array, groups: Sequence[EffectForm]
-) -> tuple[Array, NDArray[np.bool_]]:
+def downweighted(data: ResidualData, everything: Array, groups: Sequence[EffectForm]) -> tuple[Array, Mask]:
     """Standard deviations against that of a plain value with outliers put aside, and which rows those are, (rows,).
 
     `everything` is the covariance of a little of everything, um^2; `groups` are all effects that may be there.
@@ -371,7 +369,7 @@ class PlainModel:
         return self.inner[key]
 
 
-def _standing_out(data: ResidualData, z: Array) -> NDArray[np.bool_]:
+def _standing_out(data: ResidualData, z: Array) -> Mask:
     """Rows with a value beyond `GROSS`."""
     gross = np.zeros(data.count, dtype=bool)
     gross[data.row[(z > GROSS) & (data.row >= 0)]] = True
@@ -394,7 +392,7 @@ class NoiseFloor:
     squares: float = 0.0
 
 
-def noise_floor(data: ResidualData, background: Background, sigma_um: float, keep: NDArray[np.bool_]) -> NoiseFloor:
+def noise_floor(data: ResidualData, background: Background, sigma_um: float, keep: Mask) -> NoiseFloor:
     """From repeats if there are enough, else as given, else as estimated from neighbouring poses."""
     squares, freedom = repeat_scatter(data, keep)
     if freedom >= ENOUGH_REPEATS:
@@ -404,9 +402,7 @@ def noise_floor(data: ResidualData, background: Background, sigma_um: float, kee
     return NoiseFloor(sigma_um, "neighbours", 0)
 
 
-def beyond_noise(
-    data: ResidualData, noise_floor: NoiseFloor, noise: Array, left: Array, keep: NDArray[np.bool_]
-) -> float:
+def beyond_noise(data: ResidualData, noise_floor: NoiseFloor, noise: Array, left: Array, keep: Mask) -> float:
     """What is left beyond the noise (m,) and what machines have of everything, um rms, in the rows of the worst sort.
 
     Noise that comes from repeats with long tails is known to two standard deviations only, a given one to a tenth, and
@@ -420,7 +416,7 @@ def beyond_noise(
     return float(beyond.max(initial=0.0))
 
 
-def repeat_scatter(data: ResidualData, keep: NDArray[np.bool_]) -> tuple[float, int]:
+def repeat_scatter(data: ResidualData, keep: Mask) -> tuple[float, int]:
     """Sum of squares of plain values about the means of those taken at one commanded state one after another, um^2, and
     its freedom.
     """

@@ -15,12 +15,12 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
+from ncfix.arrays import Array
 from ncfix.diagnosis.effect_form import EffectForm
 from ncfix.diagnosis.evidence import MISSHAPEN, Comparison, Member, Members
 from ncfix.diagnosis.forms import shape_variations_with
 from ncfix.diagnosis.noise import everything_at
 from ncfix.diagnosis.selection import ALIKE, ASSUMED, TOLD_APART, Selected, untold
-from ncfix.measure.measurement import Array
 from ncfix.measure.observation import Observation
 from ncfix.values import frozen
 

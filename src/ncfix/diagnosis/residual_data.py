@@ -14,8 +14,8 @@ from dataclasses import field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.diagnosis.catalogue.candidate import MeasuredRange
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import SPINDLE, Axis
@@ -23,7 +23,7 @@ from ncfix.machine.basis import ConstantBasis, Polynomial
 from ncfix.machine.plausible import times_a_machining_centre
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import gauss_newton, solve
-from ncfix.measure.measurement import Array, Index, Measurement, groups
+from ncfix.measure.measurement import Measurement, groups
 from ncfix.measure.selection import Selection
 from ncfix.values import frozen
 
@@ -74,7 +74,7 @@ class ResidualData:
     unknowns: Array
     y: Array
     base: Array
-    row: Index
+    row: Ints
     relative: Array
 
     @property
@@ -171,7 +171,7 @@ class ResidualData:
         return np.concatenate(own).astype(np.float64)
 
     @cached_property
-    def component(self) -> Index:
+    def component(self) -> Ints:
         """Number of the component of each value in its row; -1 for calibrated distances."""
         parts = []
         for each in self.problem.observations:
@@ -189,7 +189,7 @@ class ResidualData:
         ]
 
     @cached_property
-    def file(self) -> Index:
+    def file(self) -> Ints:
         """Number of the file of each row."""
         return np.repeat(np.arange(len(self.measurements)), [len(each) for each in self.measurements])
 
@@ -202,7 +202,7 @@ class ResidualData:
         )
 
     @cached_property
-    def views(self) -> Index:
+    def views(self) -> Ints:
         """Number of the sort of row of each value, (m,): rows of one file in which the same was read."""
         sorts = [f"{file} {name}" for file, name in zip(self.file, self._first_names, strict=True)]
         return groups(sorts)[1][np.maximum(self.row, 0)]
@@ -213,14 +213,14 @@ class ResidualData:
         seen = self.problem.observations
         return [name for each in seen for name in each.value_names[:: len(each.components)]]
 
-    def size(self, values: Array, keep: NDArray[np.bool_] | None = None) -> float:
+    def size(self, values: Array, keep: Mask | None = None) -> float:
         """How large something is that is shown like this, um: `rms` over the sort of rows in which it is largest.
 
         Rows of another sort do not make it smaller, however many there are.
         """
         return float(self.size_by_view(values, keep).max(initial=0.0))
 
-    def size_by_view(self, values: Array, keep: NDArray[np.bool_] | None = None) -> Array:
+    def size_by_view(self, values: Array, keep: Mask | None = None) -> Array:
         """`rms` over each sort of rows by itself, (views,); zero where no row is in `keep`."""
         inside = self._inside if keep is None else self._inside & keep
         squares = (values**2).reshape(len(values), -1).sum(axis=1)
@@ -229,19 +229,19 @@ class ResidualData:
         total = np.bincount(self.views[inside], squares[inside], minlength=count)
         return np.sqrt(total / np.maximum(np.bincount(self.views[inside][rows], minlength=count), 1))
 
-    def rms(self, values: Array, keep: NDArray[np.bool_] | None = None) -> float:
+    def rms(self, values: Array, keep: Mask | None = None) -> float:
         """Root mean square over rows of the length of what each shows; values (m, ...), um, those in `keep` (m,)."""
         inside = self._inside if keep is None else self._inside & keep
         rows = len(self._firsts) if keep is None else len(np.unique(self.row[inside]))
         return float(np.linalg.norm(values if inside.all() else values[inside]) / np.sqrt(max(rows, 1)))
 
     @cached_property
-    def _inside(self) -> NDArray[np.bool_]:
+    def _inside(self) -> Mask:
         """(m,) whether a value is of a row."""
         return self.row >= 0
 
     @cached_property
-    def _firsts(self) -> Index:
+    def _firsts(self) -> Ints:
         """Of the values of rows the first of each row."""
         return np.unique(self.row[self._inside], return_index=True)[1]
 
@@ -344,7 +344,7 @@ def is_free(effect: Effect) -> bool:
     return type(effect.basis) is Polynomial and max(effect.basis.degree) <= 1
 
 
-def rows_of(problem: Problem) -> Index:
+def rows_of(problem: Problem) -> Ints:
     """(m,) the row of each value among those of all files; -1 for calibrated distances."""
     rows, first = [], 0
     for each in problem.observations:

@@ -11,10 +11,10 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.special import chdtrc
 
+from ncfix.arrays import Array, Ints
 from ncfix.diagnosis.evidence import Background
 from ncfix.diagnosis.residual_data import ResidualData
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array, Index
 from ncfix.values import frozen
 
 SHOWN = 6
@@ -145,7 +145,7 @@ def clustering(background: Background, residual: Array, places: Array) -> float:
     return total / square if count and square else 0.0
 
 
-def _nearest(places: Array, part: Array) -> Index:
+def _nearest(places: Array, part: Array) -> Ints:
     """The places (n, k) nearest to each of some of them (p, k), itself the first: (p, NEAR + 1)."""
     apart = (places**2).sum(axis=1) - 2 * part @ places.T
     nearest = np.argpartition(apart, NEAR, axis=1)[:, : NEAR + 1]

@@ -23,9 +23,9 @@ from dataclasses import field
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnosis.evidence import Comparison, Evidence, Member, Members, entry_price
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array
 from ncfix.values import frozen
 
 OVERLAP = 0.25

@@ -10,16 +10,14 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix import core
+from ncfix.arrays import Array, Index, Mask
 from ncfix.machine.route import Route, SplitRoute, Turns, batch_of
-from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, behind_each_other, some
 from ncfix.machine.steps import SMALL, dot, has_arrived, volume
 from ncfix.values import frozen
 
-Mask = NDArray[np.bool_]
 Tips = Callable[[Poses, Turns], tuple[Array, Array]]
 """Poses with their sines -> the tip (3, n), and the largest squared angle of a small motion (n,)."""
 Vector = Sequence[float | Array]
@@ -53,7 +51,7 @@ class Aim:
         """Room for n poses."""
         return cls(np.empty((3, n)), np.empty(n, dtype=np.bool_), np.empty(n))
 
-    def put(self, rows: slice | NDArray[np.intp], other: Aim) -> None:
+    def put(self, rows: slice | Index, other: Aim) -> None:
         """Put in some poses."""
         self.place[:, rows], self.arrived[rows], self.off[rows] = other.place, other.arrived, other.off
 
@@ -87,7 +85,7 @@ def aimed(
         if not active.size:
             break
         everyone = active.size == len(usable)
-        rows: slice | NDArray[np.intp] = slice(None) if everyone else active
+        rows: slice | Index = slice(None) if everyone else active
         here = replace(poses, positions=q)
         here = here if everyone else here.part(active)
         tip, angle = tips(here, turns if everyone else (turns[0][:, active], turns[1][:, active]))
@@ -106,7 +104,7 @@ def aimed(
     return Aim(q[list(axes)], arrived, off), largest
 
 
-def aimed_ahead(poses: Poses, perfect: Route, split: SplitRoute, target: Array | None) -> tuple[Aim, NDArray[np.intp]]:
+def aimed_ahead(poses: Poses, perfect: Route, split: SplitRoute, target: Array | None) -> tuple[Aim, Index]:
     """Move three linear axes until the tip is at `target` (3, n); None: where a perfect machine has it.
 
     What they do not change is undone once, ahead of all passes; so only the rest is gone through in each.

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.machine import se3
 from ncfix.machine.basis import Basis, ConstantBasis
-from ncfix.machine.se3 import Array
 from ncfix.values import frozen
 
 Vector = tuple[float, float, float]

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ncfix.machine.se3 import Array
+from ncfix.arrays import Array
 from ncfix.values import frozen
 
 REQUIRED = object()

@@ -15,10 +15,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ncfix import core
+from ncfix.arrays import Array
 from ncfix.machine import se3
 from ncfix.machine.axes import Axis, GaugeLine, Vector
 from ncfix.machine.error_model import ErrorModel, Slot, SmallMotionKind
-from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
 from ncfix.machine.steps import dot
 from ncfix.values import frozen

@@ -17,12 +17,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title, is_arm
 from ncfix.machine.basis import SMOOTH, Backlash, Basis, ConstantBasis, Fourier, Periodic, Polynomial
 from ncfix.machine.error_model import dependence_of, signals_of
 from ncfix.machine.machine import Machine
 from ncfix.machine.piecewise import PIECEWISE
-from ncfix.machine.se3 import Array
 from ncfix.machine.state import SUM, State, flatten
 from ncfix.plugins import called, handed, registry
 from ncfix.values import frozen

@@ -13,11 +13,10 @@ from enum import Enum
 from functools import cached_property, reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.machine.axes import BASE_AXES, SPINDLE, Axis, Effect, GaugeLine, Vector
 from ncfix.machine.basis import Basis
-from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal, inputs_of, middle_of_gap, signal_called
 from ncfix.values import frozen
 
@@ -306,7 +305,7 @@ class DeviationBounds:
     curvatures: Array
     reach: float
 
-    def arm(self, farthest: Array, tool_length: float, rotary: NDArray[np.bool_]) -> float:
+    def arm(self, farthest: Array, tool_length: float, rotary: Mask) -> float:
         """How far the tip is at most from any reference point, mm; arguments as in `of`."""
         return self.reach + abs(tool_length) + float(farthest[~rotary].sum())
 
@@ -315,7 +314,7 @@ class DeviationBounds:
         ways: Array,
         farthest: Array,
         tool_length: float,
-        rotary: NDArray[np.bool_],
+        rotary: Mask,
         acceleration: Array | None = None,
     ) -> tuple[Array, Array]:
         """How far the error may leave its chord, (k,) mm, and the angles turned by, (k,) rad.

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.machine.axes import BASE_AXES, ORIGIN, Axis, Effect, GaugeLine
 from ncfix.machine.chain import advance, columns, cross, turned_with
 from ncfix.machine.error_model import (
@@ -25,7 +26,6 @@ from ncfix.machine.error_model import (
     slot_of,
     unit_motion,
 )
-from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal
 from ncfix.values import frozen
 

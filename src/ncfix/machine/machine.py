@@ -10,8 +10,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ncfix.arrays import Array, Mask
 from ncfix.machine import error_model, linear, se3
 from ncfix.machine.aim import Aim, aimed, aimed_ahead, gaps
 from ncfix.machine.axes import ORIGIN, Axis, Effect, GaugeLine, Vector, degrees
@@ -19,7 +20,6 @@ from ncfix.machine.chain import JointChain, build_chain, carried_frames, carried
 from ncfix.machine.error_model import DeviationBounds, ErrorModel, bow_of, compile_effects, direction_axis
 from ncfix.machine.linear import Jacobians
 from ncfix.machine.route import Route, SplitRoute, Turns, route_of, split_route_of
-from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal, State, flatten, inputs_of, poses_first, with_lags
 from ncfix.machine.steps import SMALL
 from ncfix.toml_text import written
@@ -81,7 +81,7 @@ class Machine:
         return axis is not None and len(name) == 3 and axis.owns(name[1])
 
     @cached_property
-    def rotary(self) -> NDArray[np.bool_]:
+    def rotary(self) -> Mask:
         """Which axes are rotary, shape (n_axes,)."""
         return np.array([axis.rotary for axis in self.axes], dtype=np.bool_)
 

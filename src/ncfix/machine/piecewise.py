@@ -13,10 +13,9 @@ from dataclasses import replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.machine.basis import Basis, columns_like, distinct, key, powers
-from ncfix.machine.se3 import Array
 from ncfix.values import frozen
 
 
@@ -303,7 +302,7 @@ class Truncated(Basis):
         found = np.concatenate([own, pieces])
         return found - columns_like(self._trend()[:, 1], u) if self.detrended else found
 
-    def without_knots(self, keep: NDArray[np.bool_]) -> Self:
+    def without_knots(self, keep: Mask) -> Self:
         """The basis with some of its functions only."""
         own = len(self.powers)
         return replace(

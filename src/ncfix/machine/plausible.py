@@ -16,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine.axes import SPINDLE, Axis, Effect, component_title, is_arm, large_size
 from ncfix.machine.effects import functions_at, travel
 from ncfix.machine.error_model import signals_of
 from ncfix.machine.machine import Machine
-from ncfix.machine.se3 import Array
 from ncfix.machine.state import State
 from ncfix.toml_text import decoded, key_lines, line_of, parsed, place_of
 from ncfix.values import frozen

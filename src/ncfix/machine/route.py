@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ncfix import core
+from ncfix.arrays import Array
 from ncfix.machine import se3, steps
 from ncfix.machine.axes import Axis, GaugeLine, Vector
 from ncfix.machine.basis import ConstantBasis, Fourier, Polynomial
 from ncfix.machine.chain import JointModel, SmallMotion, columns, lies_on_axis, turn
 from ncfix.machine.error_model import EffectGroup, ErrorModel, Slot
 from ncfix.machine.piecewise import PiecewiseConstant, PiecewiseLinear, Spline
-from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses, Signal
 from ncfix.machine.steps import BACK, FORTH, GIVEN, PARTS, POWERS, SHIFT, TURN, WAVES, Functions, Number, Steps
 from ncfix.values import frozen

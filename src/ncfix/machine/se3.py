@@ -7,9 +7,9 @@ Formulas: Lynch and Park, Modern Robotics (2017), sections 3.2 and 3.3.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from ncfix.arrays import Array
 
 _SERIES_BELOW = 0.02
 """Squared angle below which five terms of a power series are exact to double precision."""

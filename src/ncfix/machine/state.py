@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ncfix import core
+from ncfix.arrays import Array, Index
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine.axes import Axis
-from ncfix.machine.se3 import Array
 from ncfix.values import frozen
 
 CHUNK = 8192
@@ -63,7 +63,7 @@ class Poses:
             out[..., part] = function(chunk, part)
         return out
 
-    def part(self, part: slice | NDArray[np.intp]) -> Poses:
+    def part(self, part: slice | Index) -> Poses:
         """Some of the poses."""
         inputs = {name: values[part] for name, values in self.inputs.items()}
         length, direction = some(self.tool_length, part), some(self.direction, part)
@@ -131,7 +131,7 @@ def _directions(values: Array, shape: tuple[int, ...], n_axes: int) -> Array:
     return np.broadcast_to(values, (*shape, n_axes)).reshape(-1, n_axes).T
 
 
-def some(values: Array, part: slice | NDArray[np.intp]) -> Array:
+def some(values: Array, part: slice | Index) -> Array:
     """What is known of some poses, (..., n); of one value for all that."""
     return values if values.shape[-1] == 1 else values[..., part]
 

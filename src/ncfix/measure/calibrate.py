@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ncfix.arguments import KNOTS, LOSSES, PLANS, PRUNE, check_choice
+from ncfix.arrays import Array, Mask
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.error_model import signals_of
@@ -21,8 +22,7 @@ from ncfix.measure import contradictions, mistakes
 from ncfix.measure.candidates import Room, candidates, offered
 from ncfix.measure.estimate import Calibration, Estimate, Problem, Residuals, fit, noise_scale
 from ncfix.measure.least_squares import AUTO, Combination, Solution, orthonormal, solve, without
-from ncfix.measure.measurement import Array, Measurement
-from ncfix.measure.observation import Mask
+from ncfix.measure.measurement import Measurement
 from ncfix.measure.refine import pruned, with_time_constants
 from ncfix.measure.selection import Selection, select
 from ncfix.values import frozen

@@ -10,13 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix.arguments import PLANS, TOOL_LENGTH
+from ncfix.arrays import Array, Mask
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.machine.axes import Axis
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.measurement import Measurement
 from ncfix.values import frozen
 
 DECIMALS = 3
@@ -178,7 +178,7 @@ def _sides(axis: Axis, position: Array, wanted: Array, room: Room) -> Array:
     return np.where(position - low < step, -1.0, np.where(high - position < step, 1.0, wanted))
 
 
-def _inside(tip: Array, room: Room) -> NDArray[np.bool_]:
+def _inside(tip: Array, room: Room) -> Mask:
     """Which places of the tip (n, 3) are within reach."""
     inside = np.ones(len(tip), dtype=bool)
     for name, (low, high) in room.reach.items():
@@ -233,7 +233,7 @@ def has_r_test(machine: Machine) -> bool:
 
 def _moved_to(
     machine: Machine, columns: Mapping[str, Array], places: Array, room: Room
-) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+) -> tuple[dict[str, Array], Mask]:
     """The columns with X, Y and Z where the tip is at the places (n, 3), and which of these the travels allow."""
     q = _poses(machine, columns)
     linear, moved = _towards(machine, q, columns["tool_length"], places)

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ncfix.arrays import Array, Ints
 from ncfix.diagnostics import ConfigError, Message
 from ncfix.machine import Machine
 from ncfix.machine.axes import COMPONENTS
 from ncfix.machine.plausible import much
-from ncfix.measure.measurement import CENTRE, ENDS, Array, Index, Measurement, component_of, groups
+from ncfix.measure.measurement import CENTRE, ENDS, Measurement, component_of, groups
 
 LARGE_MM, LARGE_RAD = 2.0, 0.02
 """Errors of which half the rows exceed this are in another unit."""
@@ -152,7 +153,7 @@ def _radians(measurement: Measurement, machine: Machine) -> Iterator[Message]:
             yield Message("NCF614", text, measurement.place(int(rows[np.abs(values).argmax()])))
 
 
-def _commanded(measurement: Measurement, axis: str) -> tuple[Index, Array]:
+def _commanded(measurement: Measurement, axis: str) -> tuple[Ints, Array]:
     """Rows and positions of an axis: of whichever is measured directly in a row, and of both ends of a length."""
     if measurement.kind == "axis":
         rows = np.flatnonzero(np.array(measurement.labels["axis"]) == axis)
@@ -239,7 +240,7 @@ def _circles(measurement: Measurement, machine: Machine) -> Iterator[Message]:
             yield Message("NCF625", text, measurement.place(int(rows[0])), hint)
 
 
-def _errors(measurement: Measurement) -> Iterator[tuple[str, Index, Array]]:
+def _errors(measurement: Measurement) -> Iterator[tuple[str, Ints, Array]]:
     """What was measured as an error: its name, in which rows, and the whole column."""
     if measurement.kind in ("tcp", "tcp6"):
         for name in measurement.measured:

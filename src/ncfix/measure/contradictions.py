@@ -11,10 +11,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import Message
 from ncfix.machine.plausible import Doubt, functions, much
 from ncfix.measure.estimate import HOPELESS, Calibration, Estimate, Problem, Residuals
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.measurement import Measurement
 from ncfix.measure.mistakes import ODD
 from ncfix.measure.selection import candidate_effects
 

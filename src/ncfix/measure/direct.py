@@ -15,12 +15,13 @@ from functools import cached_property
 
 import numpy as np
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
 from ncfix.machine.error_model import dependence_of, unit_motion
 from ncfix.machine.state import flatten, with_lags
-from ncfix.measure.measurement import Array, Index, Measurement, component_of, groups
-from ncfix.measure.observation import DEFAULT_NOISE, LEVER, Mask, Observation, Unknowns, repeatability
+from ncfix.measure.measurement import Measurement, component_of, groups
+from ncfix.measure.observation import DEFAULT_NOISE, LEVER, Observation, Unknowns, repeatability
 from ncfix.values import frozen
 
 ANGLE = 1e-4
@@ -120,7 +121,7 @@ class DirectReading(Observation):
         return np.concatenate([zero, zero[:, self._sloped] * position[:, None]], axis=1)
 
     @cached_property
-    def _sloped(self) -> Index:
+    def _sloped(self) -> Ints:
         """The series that are straightness of a linear axis."""
         linear = {axis.name for axis in self.machine.axes if not axis.rotary}
         names = [(name[:3], name[1] in "XYZ" and name[2] in linear) for name in self.series]

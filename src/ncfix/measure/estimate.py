@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtrc
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.diagnostics import Message, Place, UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.error_model import signals_of
@@ -22,8 +23,8 @@ from ncfix.machine.state import inputs_of
 from ncfix.measure import least_squares
 from ncfix.measure.instruments import observe
 from ncfix.measure.least_squares import Solution, gauss_newton, solve
-from ncfix.measure.measurement import Array, Index, Measurement
-from ncfix.measure.observation import Mask, Observation
+from ncfix.measure.measurement import Measurement
+from ncfix.measure.observation import Observation
 from ncfix.measure.selection import LOCATIONS, Selection
 from ncfix.values import frozen
 
@@ -134,7 +135,7 @@ class Problem:
     @cached_property
     def stated(self) -> Mask:
         """Which values were stated by a certificate and not read, (m,): calibrated distances."""
-        rows: Index = np.concatenate([each.rows for each in self.observations])
+        rows: Ints = np.concatenate([each.rows for each in self.observations])
         return rows < 0
 
     @cached_property
@@ -356,8 +357,8 @@ class Residuals:
     """
 
     measurements: tuple[Measurement, ...]
-    observation: Index
-    row: Index
+    observation: Ints
+    row: Ints
     component: tuple[str, ...]
     turns: Mask
     value: Array

@@ -10,11 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from ncfix.arguments import FAULT, SEED
+from ncfix.arrays import Array
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.measure.direct import DirectReading
 from ncfix.measure.lengths import BallBar, Gauge
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.measurement import Measurement
 from ncfix.measure.observation import Observation
 from ncfix.measure.tip_errors import Probing, TipErrors
 from ncfix.measure.tracker import Targets

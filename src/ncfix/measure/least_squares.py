@@ -11,12 +11,11 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.special import chdtr, ndtri, stdtrit
 
-from ncfix.measure.measurement import Array, Index
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.values import frozen
 
 NUISANCE_RANK = 1e-10
@@ -85,7 +84,7 @@ class Solution:
     """
 
     change: Array
-    kept: Index
+    kept: Ints
     unseen: tuple[int, ...]
     set_up: tuple[int, ...]
     combinations: tuple[Combination, ...]
@@ -138,7 +137,7 @@ def without(basis: Array, columns: Array) -> Array:
 
 
 def solve(
-    design: Array, nuisance: Array, target: Array, limit: Array | None = None, last: NDArray[np.bool_] | None = None
+    design: Array, nuisance: Array, target: Array, limit: Array | None = None, last: Mask | None = None
 ) -> Solution:
     """Least squares of `design @ change + nuisance @ anything = target`.
 
@@ -175,8 +174,8 @@ def solve(
 
 
 def _independent(
-    scaled: Array, seen: Index, size: Array, most: Array, order: Index
-) -> tuple[Index, Array, Array, tuple[Combination, ...], tuple[int, ...]]:
+    scaled: Array, seen: Ints, size: Array, most: Array, order: Ints
+) -> tuple[Ints, Array, Array, tuple[Combination, ...], tuple[int, ...]]:
     """A largest set of independent columns, their QR factors, what the others are made of, and which are just weak.
 
     most (s,) is the standard deviation of the scaled columns' factors beyond which one is not known; order (s,): which
@@ -201,7 +200,7 @@ def _independent(
     return kept, orthogonal, upper, tuple(combinations), tuple(weak)
 
 
-def _known(scaled: Array, chosen: Index, most: Array) -> tuple[Index, Array, Array]:
+def _known(scaled: Array, chosen: Ints, most: Array) -> tuple[Ints, Array, Array]:
     """The chosen columns whose factors are known to `most` (s,), and their QR factors.
 
     The one that is known least is left out, and all others are looked at anew: of columns whose sum alone is seen, one
@@ -221,7 +220,7 @@ def _known(scaled: Array, chosen: Index, most: Array) -> tuple[Index, Array, Arr
     return chosen[among], *np.linalg.qr(scaled[:, chosen[among]])
 
 
-def _chosen(scaled: Array, order: Index) -> Index:
+def _chosen(scaled: Array, order: Ints) -> Ints:
     """Which columns are kept: the first that are well apart, so that noise does not decide, then what is left by QR."""
     first: list[int] = []
     basis: Array = np.zeros((len(scaled), 0))
@@ -269,7 +268,7 @@ def weighted_share(loss: str) -> float:
     return 1.0
 
 
-def outliers(solution: Solution) -> NDArray[np.bool_]:
+def outliers(solution: Solution) -> Mask:
     """Which values lie further from a robust fit than noise can explain, (m,).
 
     The fit is that of the linear problem round the least-squares solution, whose columns are at hand; Huber's weights
@@ -292,7 +291,7 @@ def outliers(solution: Solution) -> NDArray[np.bool_]:
     return _confirmed(size > limit, size, columns, residual)
 
 
-def _confirmed(suspected: NDArray[np.bool_], size: Array, columns: Array, residual: Array) -> NDArray[np.bool_]:
+def _confirmed(suspected: Mask, size: Array, columns: Array, residual: Array) -> Mask:
     """The suspected values (m,) that least squares of all others do not predict; the rest is no longer suspected.
 
     With few values for the unknowns a robust fit follows some of them and leaves the others out in the cold; the t

@@ -18,8 +18,9 @@ from functools import cached_property
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.machine import Effect, Machine
-from ncfix.measure.measurement import CENTRE, Array, Measurement
+from ncfix.measure.measurement import CENTRE, Measurement
 from ncfix.measure.observation import Observation, Unknowns, linear_axes
 from ncfix.values import frozen
 

@@ -8,15 +8,12 @@ from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine, State
 from ncfix.machine.axes import COMPONENTS, NAME
 from ncfix.values import frozen
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 DIGITS = 9
 """Decimals of mm, degree and rad in files: below any instrument."""
@@ -131,7 +128,7 @@ class Measurement:
     headers: tuple[tuple[str, str], ...]
     columns: Mapping[str, Array]
     labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    lines: Index = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    lines: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     path: str = "<measurement>"
     remarks: tuple[Message, ...] = ()
 
@@ -210,7 +207,7 @@ class Measurement:
         rest = tuple(pair for pair in self.headers if pair[0] != key)
         return replace(self, headers=(*rest, (key, text)))
 
-    def rows(self, keep: Sequence[int] | Index | NDArray[np.bool_]) -> Measurement:
+    def rows(self, keep: Sequence[int] | Ints | Mask) -> Measurement:
         """Some of the rows."""
         index = np.arange(len(self))[keep]
         return replace(
@@ -221,7 +218,7 @@ class Measurement:
         )
 
 
-def groups(labels: Sequence[str]) -> tuple[tuple[str, ...], Index]:
+def groups(labels: Sequence[str]) -> tuple[tuple[str, ...], Ints]:
     """The distinct labels in their order of appearance, and the number of each row's label."""
     names = tuple(dict.fromkeys(labels))
     places = {name: index for index, name in enumerate(names)}

@@ -14,12 +14,12 @@ from itertools import combinations, permutations, product
 import numpy as np
 from scipy.special import fdtr
 
+from ncfix.arrays import Array, Mask
 from ncfix.diagnostics import Message, NcfixError
 from ncfix.machine import Machine
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array, Measurement
-from ncfix.measure.observation import Mask
+from ncfix.measure.measurement import Measurement
 from ncfix.values import frozen
 
 ODD = {"NCF614", "NCF615", "NCF616"}

@@ -15,16 +15,14 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.diagnostics import ConfigError, Message
 from ncfix.machine import Effect, GaugeLine, Machine, se3
 from ncfix.machine.axes import SPINDLE
 from ncfix.machine.plausible import reach
-from ncfix.measure.measurement import Array, Index, Measurement, groups
+from ncfix.measure.measurement import Measurement, groups
 from ncfix.values import frozen
-
-Mask = NDArray[np.bool_]
 
 LEVER = 100.0
 """mm: noise of an angle, where only that of a length is given, is that of a length at this distance."""
@@ -121,7 +119,7 @@ class Observation(ABC):
         return np.zeros(0)
 
     @cached_property
-    def rows(self) -> Index:
+    def rows(self) -> Ints:
         """The row of each value; -1 for extra values."""
         own = np.repeat(np.arange(len(self.measurement)), len(self.components))
         return np.concatenate([own, np.full(len(self.extra_values), -1)])
@@ -219,7 +217,7 @@ def _states(measurement: Measurement) -> list[str]:
 # -- geometry ----------------------------------------------------------------------------------------------------------
 
 
-def vector_columns(index: Index, count: int, matrices: Array) -> Array:
+def vector_columns(index: Ints, count: int, matrices: Array) -> Array:
     """The derivative by `count` vectors, (n, r, 3 count), of rows that depend on vector `index` (n,) by matrices
     (n, r, 3).
     """

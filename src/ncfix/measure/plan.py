@@ -15,13 +15,14 @@ from functools import cached_property
 import numpy as np
 
 from ncfix.arguments import POSES, SEED
+from ncfix.arrays import Array, Ints
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.machine.effects import library
 from ncfix.measure.candidates import APPROACH, Room, candidates, offered
 from ncfix.measure.instruments import observe
 from ncfix.measure.least_squares import NUISANCE_RANK, solve
-from ncfix.measure.measurement import Array, Index, Measurement, number
+from ncfix.measure.measurement import Measurement, number
 from ncfix.measure.observation import Observation
 from ncfix.measure.selection import Selection, form, select
 from ncfix.values import frozen
@@ -119,7 +120,7 @@ def plan(
     )
 
 
-def _least_known(pool: Pool, rows: Sequence[int], count: int) -> Index:
+def _least_known(pool: Pool, rows: Sequence[int], count: int) -> Ints:
     """Which of the first `count` columns make up the combination that the worst predicted target suffers from."""
     inverse = np.linalg.inv(information(pool, rows))
     worst = pool.targets[variances(pool, rows).argmax()]
@@ -169,7 +170,7 @@ def _values(measurement: Measurement) -> tuple[str, ...]:
 
 def pool_of(
     seen: Observation, machine: Machine, selection: Selection, room: Room, separate: Sequence[str], seed: int
-) -> tuple[Pool, Index]:
+) -> tuple[Pool, Ints]:
     """The candidates' rows over what can be determined at all, and which coefficients these are.
 
     In units of the noise: 1 um of a length, 10 urad of an angle.
@@ -202,7 +203,7 @@ def _full_rank(nuisance: Array) -> Array:
 
 
 def _targets(
-    machine: Machine, selection: Selection, kept: Index, room: Room, separate: Sequence[str], seed: int
+    machine: Machine, selection: Selection, kept: Ints, room: Room, separate: Sequence[str], seed: int
 ) -> Array:
     """What is to be known well: the tip error over the volume, um, or the coefficients of some effects."""
     if separate:
@@ -250,7 +251,7 @@ class Pool:
         return max(float((self.blocks**2).mean()), 1e-300)
 
 
-def choose(pool: Pool, count: int, fixed: int = 0) -> Index:
+def choose(pool: Pool, count: int, fixed: int = 0) -> Ints:
     """Indices of the candidates to be measured; the first `fixed` blocks are measured anyway."""
     inverse = np.linalg.inv(information(pool, range(fixed)))
     free = np.ones(len(pool.blocks), dtype=bool)

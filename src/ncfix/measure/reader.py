@@ -14,11 +14,12 @@ from dataclasses import field, replace
 import numpy as np
 
 from ncfix import files
+from ncfix.arrays import Array
 from ncfix.cells import MARKS, Cell, SeparatedText, other_form, plain_text
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.machine import Machine
 from ncfix.measure import checks, foreign
-from ncfix.measure.measurement import CENTRE, CHOICES, COMMON, ENDS, KINDS, STATES, Array, Measurement, MeasurementKind
+from ncfix.measure.measurement import CENTRE, CHOICES, COMMON, ENDS, KINDS, STATES, Measurement, MeasurementKind
 from ncfix.toml_text import LARGEST, did_you_mean
 from ncfix.values import mutable
 

@@ -20,14 +20,14 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import stdtr
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Basis, Polynomial
 from ncfix.machine.piecewise import Truncated
 from ncfix.measure.estimate import HOPELESS, Estimate, LeftOut, Problem, fit, noise_scale
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array, Index, Measurement
-from ncfix.measure.observation import Mask
+from ncfix.measure.measurement import Measurement
 from ncfix.measure.selection import Selection, labels_of
 
 SCALE = 24
@@ -114,7 +114,7 @@ def _whole(selection: Selection, chosen: Mask) -> Mask:
     return stays
 
 
-def _alone(problem: Problem, estimate: Estimate, kept: Index) -> tuple[Array, Array]:
+def _alone(problem: Problem, estimate: Estimate, kept: Ints) -> tuple[Array, Array]:
     """What coefficients show beside the set-up, and what those of them have to explain that are `kept`, in noises."""
     root, basis = np.sqrt(estimate.weight) / problem.sigma, estimate.solution.nuisance
     asked = np.zeros(len(estimate.coefficients))

@@ -17,9 +17,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import ConfigError
 from ncfix.machine import Effect, Machine, se3
-from ncfix.measure.measurement import SHIFTS, TURNS, Array, Measurement, groups
+from ncfix.measure.measurement import SHIFTS, TURNS, Measurement, groups
 from ncfix.measure.observation import (
     Observation,
     Unknowns,

@@ -22,15 +22,15 @@ from itertools import permutations, product
 
 import numpy as np
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.diagnostics import Message
 from ncfix.machine import Effect, Machine, State, se3
 from ncfix.measure.least_squares import gauss_newton
-from ncfix.measure.measurement import Array, Index, Measurement, groups
+from ncfix.measure.measurement import Measurement, groups
 from ncfix.measure.observation import (
     LEVER,
     TOOL,
     WORKPIECE,
-    Mask,
     Observation,
     Unknowns,
     best_rotation,
@@ -199,8 +199,8 @@ class Sights:
     """
 
     poses: Array
-    target: Index
-    sets: Index
+    target: Ints
+    sets: Ints
     known: Mask
 
     def base(self, places: Array) -> Array:
@@ -239,7 +239,7 @@ class Sights:
         moving = most > OPEN * np.abs(changes).max(axis=1, initial=0.0)
         return changes[moving] * (LEVER / most[moving])[:, None]
 
-    def of_set(self, number: int) -> tuple[Sights, Index]:
+    def of_set(self, number: int) -> tuple[Sights, Ints]:
         """Some readings of one set, as if there were no other, and which these are."""
         rows = np.flatnonzero(self.sets == number)
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, ENOUGH).astype(int))]

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.diagnosis.compound import EffectFinding
 from ncfix.diagnosis.diagnosis import NOTHING, Diagnosis
 from ncfix.diagnosis.ladder import in_words, ladder
@@ -30,7 +30,6 @@ from ncfix.diagnosis.presentation import (
 from ncfix.machine import Effect
 from ncfix.machine.basis import Periodic
 from ncfix.machine.effects import with_unit
-from ncfix.measure.measurement import Array
 from ncfix.reports.document import ArrowMap, Bars, Document, Dots, Line, Paragraph, Part, Plot, ReportSection, Table
 from ncfix.values import frozen
 
@@ -208,7 +207,7 @@ def _depends_on(diagnosis: Diagnosis, finding: EffectFinding) -> tuple[str, Arra
     return with_unit(data.machine, axis.name), data.q[:, data.machine.axis_names.index(axis.name)] / axis.unit
 
 
-def _ways(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+def _ways(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[tuple[str, Mask]]:
     """Words and rows of each direction in which the axis came, where the finding depends on that; else all rows."""
     data, axis = diagnosis.data, finding.candidate.axis
     side = data.column(f"dir_{axis}") if axis else np.zeros(data.count)

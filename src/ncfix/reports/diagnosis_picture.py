@@ -13,7 +13,7 @@ from ncfix.reports.diagnosis import MeasuredCurve, measured_curves
 from ncfix.reports.picture import COLOURS, STYLE, UNDATED, require_matplotlib
 
 if TYPE_CHECKING:
-    from ncfix.machine.se3 import Array
+    from ncfix.arrays import Array
 
 PANELS = 7
 """Curves that are drawn at most, those of the first findings."""

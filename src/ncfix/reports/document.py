@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ncfix.machine.se3 import Array
+from ncfix.arrays import Array
 from ncfix.values import frozen
 
 

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import UsageError
-from ncfix.machine.se3 import Array
 
 OWN = b'<meta name="generator" content="ncfix '
 """What says that a file is a page of ncfix's, which a newer one may replace."""

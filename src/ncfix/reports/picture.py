@@ -12,7 +12,7 @@ from ncfix.compensate.figures.path_record import CUT, EDGES, RAPID, selection
 from ncfix.diagnostics import UsageError
 
 if TYPE_CHECKING:
-    from ncfix.machine.se3 import Array
+    from ncfix.arrays import Array
     from ncfix.reports.program_page import ProgramPage
 
 FORMS = ("svg", "png", "pdf")

@@ -9,11 +9,11 @@ from html import escape
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.compensate import FixOptions
 from ncfix.compensate.figures.path_record import EDGES, LISTED, Extent, ListedBlock, ListedPlace, PathRecord
 from ncfix.compensate.report import FixReport
 from ncfix.machine import Axis, Machine
-from ncfix.machine.se3 import Array
 from ncfix.reports.content import machine_sections
 from ncfix.reports.document import Plot
 from ncfix.reports.pages import LIBRARY, asset, card, filled, library, packed, table, with_columns

@@ -14,8 +14,8 @@ from itertools import cycle
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import Place, UsageError
-from ncfix.machine.se3 import Array
 from ncfix.plugins import called, registry
 from ncfix.reports.document import ArrowMap, Bars, Document, Dots, Line, Paragraph, Part, Plot, Table
 

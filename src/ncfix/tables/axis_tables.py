@@ -19,8 +19,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index
 from ncfix.machine import Machine, State
 from ncfix.tables.compensation import NOTHING, Compensation, Term, own_terms
 from ncfix.tables.correction import (
@@ -32,7 +32,7 @@ from ncfix.tables.correction import (
     random_poses,
     random_ways,
 )
-from ncfix.tables.grid import Array, Grid, projector
+from ncfix.tables.grid import Grid, projector
 from ncfix.values import frozen
 
 MEAN_POSES = 64
@@ -177,12 +177,12 @@ class Region:
         over_all: Array = (curve[1:] + curve[:-1]).mean(axis=0) / 2
         return curve, over_all
 
-    def outputs(self, axis: int, curve: Array, target: float) -> NDArray[np.intp]:
+    def outputs(self, axis: int, curve: Array, target: float) -> Index:
         """The axes that tables over this one correct: itself, and those that need more than a tenth of the target."""
         needed = np.flatnonzero((np.abs(curve) * self._lever).max(axis=0) > target / 10)
         return np.union1d(needed, [axis])
 
-    def nodes_needed(self, axis: int, curve: Array, outputs: NDArray[np.intp], most: int, target: float) -> int:
+    def nodes_needed(self, axis: int, curve: Array, outputs: Index, most: int, target: float) -> int:
         """How many nodes keep straight lines between them within half the target of all curves, at most."""
         fine = self.fine(axis)
         return max(nodes_needed(fine, curve[:, j] * self._lever[j], most, target / 2) for j in outputs)
@@ -193,9 +193,7 @@ class Region:
         return np.where(self.machine.rotary, RADIUS, 1.0)
 
 
-def _axis_tables(
-    region: Region, axis: int, curve: Array, outputs: NDArray[np.intp], nodes: Array, half: Array
-) -> AxisTables:
+def _axis_tables(region: Region, axis: int, curve: Array, outputs: Index, nodes: Array, half: Array) -> AxisTables:
     """The tables over an axis, by least squares to its curves (FINE, n_axes); `half` (FINE,) of the own one's play."""
     fit = projector(region.fine(axis), nodes)
     own = int(np.flatnonzero(outputs == axis)[0])

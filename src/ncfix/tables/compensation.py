@@ -14,7 +14,8 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from ncfix.tables.grid import Array, Grid
+from ncfix.arrays import Array
+from ncfix.tables.grid import Grid
 from ncfix.values import frozen
 
 LINEAR = ("X", "Y", "Z")

@@ -15,11 +15,11 @@ from dataclasses import asdict, field
 from typing import Any, ClassVar
 
 from ncfix.arguments import TARGET_UM, TOOL_LENGTH
+from ncfix.arrays import Array
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
 from ncfix.plugins import called, nearest, registry, useless
 from ncfix.tables.compensation import Compensation, Tables, class_of
-from ncfix.tables.grid import Array
 from ncfix.tables.table_files import Remarks, check_all, messages_of
 from ncfix.values import frozen
 

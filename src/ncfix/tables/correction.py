@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import Machine, State
 from ncfix.tables.compensation import Tables
-from ncfix.tables.grid import Array, full_grid
+from ncfix.tables.grid import full_grid
 from ncfix.values import frozen
 
 SPATIAL = ("X", "Y", "Z")
@@ -178,7 +178,7 @@ class Residual:
     """Tip errors at poses q (n, n_axes), before and after (n,), mm; `largest` correction per axis (n_axes,)."""
 
     names: tuple[str, ...]
-    rotary: NDArray[np.bool_]
+    rotary: Mask
     q: Array
     before: Array
     after: Array

@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine import Machine
 from ncfix.plugins import called, handed, useless
 from ncfix.tables.compensation import Tables
 from ncfix.tables.control import Control, Files, Least, Request, Written
 from ncfix.tables.correction import POSES, Residual, random_poses, ranges_of, residual
-from ncfix.tables.grid import Array
 from ncfix.tables.sheet import as_html, as_markdown
 from ncfix.values import frozen
 from ncfix.version import __version__

@@ -20,11 +20,10 @@ from dataclasses import field
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index
 from ncfix.values import frozen, mutable
 
-Array = NDArray[np.float64]
 WITHIN = 4
 """Places looked at in each cell along each axis."""
 STEPS = (128, 256, 512, 1024)
@@ -98,7 +97,7 @@ class Grid:
             total += weight[:, None] * self.values[cells]
         return total
 
-    def _place(self, index: int, column: Array) -> tuple[NDArray[np.intp], Array]:
+    def _place(self, index: int, column: Array) -> tuple[Index, Array]:
         """In which cell along one input, and how far through it (0 ... 1)."""
         line = self.nodes[index]
         if len(line) == 1:

@@ -15,10 +15,10 @@ from dataclasses import replace
 from itertools import combinations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index
 from ncfix.tables.correction import random_poses
-from ncfix.tables.grid import Array, Grid, on_full_grid
+from ncfix.tables.grid import Grid, on_full_grid
 from ncfix.tables.volume import CHECKS, Volume, search
 from ncfix.values import frozen
 
@@ -196,7 +196,7 @@ def _part(volume: Volume, face: Face, before: Sequence[Face]) -> Volume:
     )
 
 
-def _different(positions: Array) -> tuple[Array, NDArray[np.intp]]:
+def _different(positions: Array) -> tuple[Array, Index]:
     """Positions (n, k), each once, (m, k), and which of these each is, (n,): on a grid many are the same."""
     codes, count = np.zeros(len(positions), dtype=np.intp), 1
     for column in positions.T:

@@ -19,8 +19,8 @@ from string import ascii_letters
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index
 from ncfix.machine import Machine, State
 from ncfix.tables.control import Least
 from ncfix.tables.correction import (
@@ -32,7 +32,7 @@ from ncfix.tables.correction import (
     poses_along,
     random_ways,
 )
-from ncfix.tables.grid import Array, hats, on_full_grid, spline_weights
+from ncfix.tables.grid import hats, on_full_grid, spline_weights
 from ncfix.tables.volume import Volume, even_line
 from ncfix.values import frozen
 
@@ -79,7 +79,7 @@ class Remainder:
         """At the worst of the nodes."""
         return float(np.linalg.norm(self.values, axis=-1).max())
 
-    def along(self, axis: int, positions: Array, places: NDArray[np.intp]) -> Array:
+    def along(self, axis: int, positions: Array, places: Index) -> Array:
         """At positions (n,) of one axis and nodes `places` (m, n_axes) of the others, by splines: (n, m, n_outputs)."""
         values = np.moveaxis(self.values, axis, 0)
         weights = spline_weights(self.nodes[axis], positions, 2 * np.pi if self.turns[axis] else None)

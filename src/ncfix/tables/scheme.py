@@ -16,10 +16,11 @@ from functools import cache
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.machine import Machine, State
 from ncfix.tables.compensation import Compensation
 from ncfix.tables.correction import exact_correction, linear_axes, rotary_correction
-from ncfix.tables.grid import Array, full_grid, on_full_grid
+from ncfix.tables.grid import full_grid, on_full_grid
 from ncfix.tables.lower_bounds import Remainder, least_worst
 from ncfix.tables.scheme_tables import AxisPositions, Corrections, StagedTables, TableSample, by_way, checked, followed
 from ncfix.tables.separable import (

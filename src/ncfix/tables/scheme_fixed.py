@@ -18,11 +18,11 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine
 from ncfix.tables.compensation import Compensation
 from ncfix.tables.correction import linear_axes, random_poses
-from ncfix.tables.grid import Array
 from ncfix.tables.scheme import LEVER, Scheme, SchemeTask, lines_of, moving, turning
 from ncfix.tables.scheme_tables import Corrections, StagedTables, checked
 from ncfix.tables.separable import Star, TableLayout

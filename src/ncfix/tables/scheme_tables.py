@@ -14,11 +14,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index
 from ncfix.tables.compensation import Compensation, Term
 from ncfix.tables.correction import poses_along, random_poses, random_ways
-from ncfix.tables.grid import Array, Grid
+from ncfix.tables.grid import Grid
 from ncfix.tables.separable import Star, TableLayout
 from ncfix.values import frozen
 
@@ -106,7 +106,7 @@ class TableSample:
     """Where functions of one axis are looked for: combinations of nodes of all axes, (m, n_axes), their numbers."""
 
     nodes: Sequence[Array]
-    places: NDArray[np.intp]
+    places: Index
 
     @classmethod
     def of(cls, nodes: Sequence[Array]) -> TableSample:

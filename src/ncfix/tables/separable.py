@@ -20,7 +20,7 @@ from itertools import combinations, product
 
 import numpy as np
 
-from ncfix.tables.grid import Array
+from ncfix.arrays import Array
 from ncfix.values import frozen
 
 NOISE = 2e-6

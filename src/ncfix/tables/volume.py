@@ -12,11 +12,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index
 from ncfix.machine import Machine, State
 from ncfix.tables.correction import corners, even_poses, exact_correction, linear_axes, random_poses
-from ncfix.tables.grid import WITHIN, Array, Bending, Grid, between, fitted, on_full_grid
+from ncfix.tables.grid import WITHIN, Bending, Grid, between, fitted, on_full_grid
 from ncfix.values import frozen, mutable
 
 LINES = 32
@@ -56,7 +56,6 @@ LAST = 3
 """Of the largest grids, how many are tried."""
 REMEMBERED = 1 << 16
 """Grids with more points than this are not kept for when they are asked for again."""
-Counts = NDArray[np.intp]
 
 
 @mutable
@@ -328,8 +327,8 @@ def search(volume: Volume, target: float, most: Sequence[int], points: int, equa
     return _thinned(volume, found, target) if found.reached else found
 
 
-def _along(volume: Volume, axis: int, target: float, most: int) -> tuple[Counts, Array]:
-    """Counts along one input, and what each misses there."""
+def _along(volume: Volume, axis: int, target: float, most: int) -> tuple[Index, Array]:
+    """Index along one input, and what each misses there."""
     counts, missed = [], []
     for count in volume.counts(axis, most):
         counts.append(count)
@@ -339,7 +338,7 @@ def _along(volume: Volume, axis: int, target: float, most: int) -> tuple[Counts,
     return np.array(counts, dtype=np.intp), np.array(missed)
 
 
-def _frontier(axes: Sequence[tuple[Counts, Array]], points: int) -> tuple[Counts, Array]:
+def _frontier(axes: Sequence[tuple[Index, Array]], points: int) -> tuple[Index, Array]:
     """The counts (k, n_inputs) of which none has more nodes and misses more than another, by their number of nodes.
 
     And what each misses along all axes together.
@@ -358,13 +357,13 @@ def _frontier(axes: Sequence[tuple[Counts, Array]], points: int) -> tuple[Counts
     return counts, missed
 
 
-def _at(volume: Volume, counts: Counts, target: float) -> Mesh:
+def _at(volume: Volume, counts: Index, target: float) -> Mesh:
     grid = volume.grid(counts.tolist())
     left = volume.left(grid)
     return Mesh(grid, left, left <= target)
 
 
-def _first(volume: Volume, target: float, ladder: Counts) -> Mesh:
+def _first(volume: Volume, target: float, ladder: Index) -> Mesh:
     """The first of a ladder that is good enough, or the best of them."""
     best = _at(volume, ladder[0], target)
     for counts in ladder[1:]:
@@ -374,7 +373,7 @@ def _first(volume: Volume, target: float, ladder: Counts) -> Mesh:
     return best
 
 
-def _bisected(volume: Volume, target: float, ladder: Counts, surely: bool) -> Mesh:
+def _bisected(volume: Volume, target: float, ladder: Index, surely: bool) -> Mesh:
     """The first of a ladder that is good enough, if they get better and better; or the best of the last few.
 
     Those are looked at only if the last of all is not good enough, or none before it is. The last is the largest by
@@ -396,7 +395,7 @@ def _bisected(volume: Volume, target: float, ladder: Counts, surely: bool) -> Me
     return best or _best_of_last(volume, target, ladder, _at(volume, ladder[-1], target))
 
 
-def _best_of_last(volume: Volume, target: float, ladder: Counts, last: Mesh) -> Mesh:
+def _best_of_last(volume: Volume, target: float, ladder: Index, last: Mesh) -> Mesh:
     before = [_at(volume, counts, target) for counts in ladder[-LAST:-1]]
     return min((*before, last), key=lambda mesh: mesh.left)
 

@@ -10,13 +10,13 @@ from contextlib import suppress
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnostics import NcfixError, RefusedError, UsageError
 from ncfix.machine import Effect, Machine, loads
 from ncfix.machine.basis import Polynomial
 from ncfix.tables.control import Control, Request
 from ncfix.tables.correction import random_poses, random_ways, ranges_of, residual
 from ncfix.tables.export import Exported, export
-from ncfix.tables.grid import Array
 
 AXES = """
 ncfix = 1

@@ -17,9 +17,7 @@ from ncfix.text.reach import runs_straight_on
 from ncfix.values import frozen
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from ncfix.arrays import Ints
     from ncfix.text.build import Parsed
     from ncfix.text.dialect import Dialect
     from ncfix.text.shapes import Scan
@@ -102,9 +100,9 @@ class Language:
     own_codes  it takes the codes, cycles and keywords that a dialect adds
     """
 
-    split: Callable[[bytes], NDArray[np.int64]]
-    end: Callable[[bytes, NDArray[np.int64]], int]
-    scan: Callable[[bytes, NDArray[np.int64]], Scan]
+    split: Callable[[bytes], Ints]
+    end: Callable[[bytes, Ints], int]
+    scan: Callable[[bytes, Ints], Scan]
     parse: Callable[[Dialect, str], Parsed]
     layout: Callable[[Program, int], BlockLayout | None]
     spelling: Callable[[Program], Spelling]

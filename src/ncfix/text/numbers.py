@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Bytes, Ints, Mask
 from ncfix.values import frozen
 
 EXACT_DIGITS = 15
@@ -19,7 +20,7 @@ EXACT_DIGITS = 15
 POINT = ord(".")
 
 
-def table(characters: bytes) -> NDArray[np.bool_]:
+def table(characters: bytes) -> Mask:
     """A look-up table: which bytes are among `characters`."""
     found = np.zeros(256, dtype=np.bool_)
     found[list(characters)] = True
@@ -47,13 +48,13 @@ class Numbers:
     covered  (n,) the bytes that belong to a number
     """
 
-    spans: NDArray[np.int64]
-    values: NDArray[np.float64]
-    broken: NDArray[np.bool_]
-    covered: NDArray[np.bool_]
+    spans: Ints
+    values: Array
+    broken: Mask
+    covered: Mask
 
 
-def find_numbers(text: NDArray[np.uint8], numeric: NDArray[np.bool_], fixed: NDArray[np.bool_]) -> Numbers:
+def find_numbers(text: Bytes, numeric: Mask, fixed: Mask) -> Numbers:
     """The numbers of `text`.
 
     numeric  (n,) the bytes that may belong to a number
@@ -77,7 +78,7 @@ def find_numbers(text: NDArray[np.uint8], numeric: NDArray[np.bool_], fixed: NDA
     return Numbers(runs, values, broken, covered)
 
 
-def is_numeric(text: NDArray[np.uint8]) -> NDArray[np.bool_]:
+def is_numeric(text: Bytes) -> Mask:
     """`NUMERIC[text]`, faster: digits and the point stand together in the alphabet, with a stroke between them."""
     return (text - np.uint8(POINT) < ord("9") - POINT + 1) & (text != ord("/"))
 
@@ -86,7 +87,7 @@ SHORT = 64
 """Stretches up to this long are filled all at once, place by place; the rest of longer ones one by one."""
 
 
-def fill(cells: NDArray[Any], spans: NDArray[np.int64], value: int) -> None:
+def fill(cells: NDArray[Any], spans: Ints, value: int) -> None:
     """Set cells over stretches of them, most of which are short."""
     starts, stops = spans[:, 0].copy(), spans[:, 1]
     for _ in range(SHORT):
@@ -105,11 +106,11 @@ def fill(cells: NDArray[Any], spans: NDArray[np.int64], value: int) -> None:
 class LastBefore:
     """The last character before each of some places that is no blank: where it is, and what; 0 at the text's start."""
 
-    places: NDArray[np.int64]
-    characters: NDArray[np.uint8]
+    places: Ints
+    characters: Bytes
 
 
-def last_before(text: NDArray[np.uint8], places: NDArray[np.int64]) -> LastBefore:
+def last_before(text: Bytes, places: Ints) -> LastBefore:
     """What stands before `places`, up to `BLANKS` blanks left out (a blank, if there are more)."""
     at = places - 1
     characters = text[np.maximum(at, 0)]
@@ -123,7 +124,7 @@ def last_before(text: NDArray[np.uint8], places: NDArray[np.int64]) -> LastBefor
     return LastBefore(at, characters)
 
 
-def runs_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
+def runs_of(mask: Mask) -> Ints:
     """Start and stop of each run of True, shape (k, 2)."""
     framed = np.zeros(len(mask) + 2, dtype=np.bool_)
     framed[1:-1] = mask
@@ -134,7 +135,7 @@ EIGHT = 8
 """Bytes that are converted at once, as one whole number; the last ones of a run are its highest."""
 
 
-def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def convert(text: Bytes, runs: Ints) -> tuple[Array, Mask]:
     """The values of runs of digits and points, exactly rounded; and which are malformed."""
     found = digits_of(text, runs[:, 0], runs[:, 1])
     values = found.value.astype(np.float64)
@@ -150,16 +151,14 @@ def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[n
     return values, broken
 
 
-def in_lanes(text: NDArray[np.uint8]) -> NDArray[np.uint64]:
+def in_lanes(text: Bytes) -> NDArray[np.uint64]:
     """A text, sixteen zero bytes before it and some behind it, as numbers of eight bytes each."""
     padded = np.zeros((len(text) // EIGHT + 4) * EIGHT, dtype=np.uint8)
     padded[2 * EIGHT : 2 * EIGHT + len(text)] = text
     return padded.view("<u8")
 
 
-def digits_of(
-    text: NDArray[np.uint8], starts: NDArray[np.int64], stops: NDArray[np.int64], *, valued: bool = True
-) -> Digits:
+def digits_of(text: Bytes, starts: Ints, stops: Ints, *, valued: bool = True) -> Digits:
     """What stands in runs of digits and points; of long ones in their last sixteen bytes. See `Digits.of`."""
     lanes, lengths = in_lanes(text), stops - starts
     found = Digits.of(eight_at(lanes, stops + EIGHT), lengths, valued)
@@ -169,7 +168,7 @@ def digits_of(
     return found
 
 
-def eight_at(lanes: NDArray[np.uint64], places: NDArray[np.int64]) -> NDArray[np.uint64]:
+def eight_at(lanes: NDArray[np.uint64], places: Ints) -> NDArray[np.uint64]:
     """Eight bytes from each of some places on, as one number; `lanes` has them at every eighth place."""
     lane, over = places >> 3, (places & 7).view(np.uint64)
     over <<= np.uint64(3)
@@ -192,7 +191,7 @@ OWN = np.array([0, *((1 << 64) - (1 << 64 - 8 * count) for count in range(1, EIG
 """The highest so many bytes of eight."""
 MASKS = {8: 0x00FF00FF00FF00FF, 16: 0x0000FFFF0000FFFF, 32: 0x00000000FFFFFFFF}
 """Every second group of so many bits."""
-POWERS: NDArray[np.float64] = (10.0 ** np.arange(23)).astype(np.float64)
+POWERS: Array = (10.0 ** np.arange(23)).astype(np.float64)
 """Those powers of ten that a double holds exactly."""
 
 
@@ -206,14 +205,14 @@ class Digits:
     pure     there is nothing but digits and points; True where the value was asked for
     """
 
-    value: NDArray[np.int64]
-    tail: NDArray[np.int64]
-    pointed: NDArray[np.bool_]
-    several: NDArray[np.bool_]
-    pure: NDArray[np.bool_]
+    value: Ints
+    tail: Ints
+    pointed: Mask
+    several: Mask
+    pure: Mask
 
     @classmethod
-    def of(cls, words: NDArray[np.uint64], lengths: NDArray[np.int64], valued: bool) -> Digits:
+    def of(cls, words: NDArray[np.uint64], lengths: Ints, valued: bool) -> Digits:
         """Of the last `lengths` bytes of words in which the first character is the lowest byte.
 
         A point shows as the only zero byte when its code is taken from all bytes. `valued`: the words are known to be
@@ -237,7 +236,7 @@ class Digits:
         value = whole(words, points, below) if valued else words
         return cls(value.view(np.int64), tail, pointed, several, pure)
 
-    def put_before(self, rows: NDArray[np.int64], front: Digits) -> None:
+    def put_before(self, rows: Ints, front: Digits) -> None:
         """Put eight characters before those of some rows."""
         again = front.pointed & self.pointed[rows]
         first = front.pointed & ~again

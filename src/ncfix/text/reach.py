@@ -10,8 +10,8 @@ import re
 from dataclasses import field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Ints
 from ncfix.text.tree import Comment, Constant, OWordLine, Skip, Template, Word
 from ncfix.values import frozen, mutable
 
@@ -36,7 +36,7 @@ LEADER = re.compile(rb"(?:[ \t\r\n]|\([^()\r\n]*+(?:\([^()\r\n]*+\)[^()\r\n]*+)*
 """Blank lines and comments, with brackets in them, too."""
 
 
-def tape_end(source: bytes, blocks: NDArray[np.int64]) -> int:
+def tape_end(source: bytes, blocks: Ints) -> int:
     """The block with the `%` that ends the tape; the number of blocks if there is none.
 
     It is the first `%` alone on its line that has something before it. A `%` after nothing but blank lines and
@@ -52,7 +52,7 @@ def tape_end(source: bytes, blocks: NDArray[np.int64]) -> int:
     return len(blocks)
 
 
-def whole_text(source: bytes, blocks: NDArray[np.int64]) -> int:
+def whole_text(source: bytes, blocks: Ints) -> int:
     """As `tape_end` for languages without a mark that ends the text: what stands behind the program's end is read."""
     return len(blocks)
 

@@ -17,6 +17,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.build import Parsed
 from ncfix.text.dialect import Dialect, check_content, detect, get, header_length
@@ -120,9 +121,9 @@ def read_like(source: bytes, path: str, like: Program, control: str = "") -> Pro
 class PartColumns(NamedTuple):
     """The columns of a part of a program: the first number of each block, and how many there are; spans and values."""
 
-    first: NDArray[np.int64]
-    spans: NDArray[np.int64]
-    values: NDArray[np.float64]
+    first: Ints
+    spans: Ints
+    values: Array
 
 
 @mutable
@@ -142,7 +143,7 @@ class ProgramReading:
     path: str
     dialect: Dialect
     language: Language
-    blocks: NDArray[np.int64]
+    blocks: Ints
     tape_end: int
     templates: list[Template] = field(default_factory=list)
     index: dict[bytes | None, int] = field(default_factory=dict)
@@ -309,7 +310,7 @@ class ProgramReading:
         return self.reach.in_doubt
 
 
-def moved_by(places: NDArray[np.int64], offset: int) -> NDArray[np.int64]:
+def moved_by(places: Ints, offset: int) -> Ints:
     """Places so many bytes, or numbers, further on; the same array where that is none."""
     return places + offset if offset else places
 
@@ -321,7 +322,7 @@ def agrees(scan: Scan, row: int, parsed: Parsed, start: int) -> bool:
     return bool(comment == parsed.comment and np.array_equal(spans, np.reshape(parsed.spans, (-1, 2))))
 
 
-def with_exact(scan: Scan, exact: dict[int, Parsed], starts: NDArray[np.int64]) -> PartColumns:
+def with_exact(scan: Scan, exact: dict[int, Parsed], starts: Ints) -> PartColumns:
     """The columns of a scan, where the blocks in `exact` have the grammar's numbers instead of the scan's."""
     if not exact:
         return PartColumns(scan.first_number, scan.spans, scan.values)

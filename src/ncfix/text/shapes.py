@@ -13,9 +13,9 @@ from functools import partial, reduce
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix import core
+from ncfix.arrays import Array, Bytes, Ints, Mask
 from ncfix.text.numbers import (
     BLANK,
     BLANKS,
@@ -67,16 +67,14 @@ class Scan:
     """
 
     shapes: list[bytes | None]
-    comment: NDArray[np.int64]
-    first_number: NDArray[np.int64]
-    spans: NDArray[np.int64]
-    values: NDArray[np.float64]
-    group: NDArray[np.int64] | None = None
+    comment: Ints
+    first_number: Ints
+    spans: Ints
+    values: Array
+    group: Ints | None = None
 
     @classmethod
-    def of(
-        cls, keys: bytes, blocks: NDArray[np.int64], comment: NDArray[np.int64], numbers: Numbers, apart: set[int]
-    ) -> Scan:
+    def of(cls, keys: bytes, blocks: Ints, comment: Ints, numbers: Numbers, apart: set[int]) -> Scan:
         """Of the keys of all blocks, see `shape_keys`; the blocks `apart` must be taken as they are."""
         shapes: list[bytes | None]
         if apart:
@@ -104,7 +102,7 @@ class Scan:
         return cls(shapes, np.concatenate(comment), first, np.concatenate(spans), values, np.concatenate(group))
 
     @property
-    def groups(self) -> NDArray[np.int64]:
+    def groups(self) -> Ints:
         """(n,) which of the shapes each block has."""
         return np.arange(len(self.comment)) if self.group is None else self.group
 
@@ -125,7 +123,7 @@ class Scan:
         return replace(found, shapes=shapes)
 
 
-def split_blocks(source: bytes) -> NDArray[np.int64]:
+def split_blocks(source: bytes) -> Ints:
     """Start and stop byte of each line, shape (n, 2), line ends not included.
 
     A line ends with LF, CR LF, or CR CR LF (which some transfers leave); with CR alone only in a text
@@ -144,7 +142,7 @@ def split_blocks(source: bytes) -> NDArray[np.int64]:
     return np.stack((starts, stops), axis=1)
 
 
-def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -> Scan:
+def scan(source: bytes, blocks: Ints, *, pointless: bool = False) -> Scan:
     """Find the numbers and the shape of every block; `pointless`: numbers without a point make another shape."""
     text = np.frombuffer(source, dtype=np.uint8)
     if core.engaged():
@@ -162,10 +160,10 @@ UNTOUCHED, CRAMPED = -1, -2
 SPARE, DENSE, VARIED = 1 << 12, 5, 16
 """What room there is at first: for so many numbers and characters of different shapes, and for one in so many bytes."""
 
-PlainScan = Callable[[bytes, NDArray[np.int64]], Scan]
+PlainScan = Callable[[bytes, Ints], Scan]
 
 
-def in_slices(source: bytes, blocks: NDArray[np.int64], scan: PlainScan) -> Scan:
+def in_slices(source: bytes, blocks: Ints, scan: PlainScan) -> Scan:
     """What `scan` makes of a text, a slice of it at a time."""
     begins = set(np.searchsorted(blocks[:, 0], np.arange(0, len(source), SLICE_BYTES)).tolist())
     if len(source) <= SLICE_BYTES or len(begins) == 1:
@@ -177,7 +175,7 @@ def in_slices(source: bytes, blocks: NDArray[np.int64], scan: PlainScan) -> Scan
     return Scan.joined(parts)
 
 
-def scan_any(source: bytes, blocks: NDArray[np.int64], pointless: bool) -> Scan:
+def scan_any(source: bytes, blocks: Ints, pointless: bool) -> Scan:
     """As `scan`, of any text, with numpy alone."""
     found = [(*match.span(), match.start("last") >= 0) for match in matches(COMMENT, source, b"(;")]
     comments = np.array(found, dtype=np.int64).reshape(-1, 3)
@@ -186,13 +184,13 @@ def scan_any(source: bytes, blocks: NDArray[np.int64], pointless: bool) -> Scan:
 
 
 def scan_beside(
-    text: NDArray[np.uint8],
-    blocks: NDArray[np.int64],
-    silent: NDArray[np.int64],
-    final: NDArray[np.int64],
+    text: Bytes,
+    blocks: Ints,
+    silent: Ints,
+    final: Ints,
     *,
-    fixed: NDArray[np.bool_] = FIXED,
-    named: NDArray[np.bool_] | None = None,
+    fixed: Mask = FIXED,
+    named: Mask | None = None,
     apart: Iterable[int] = (),
     pointless: bool = False,
 ) -> Scan:
@@ -221,12 +219,12 @@ def scan_beside(
 
 
 def scan_compiled(
-    text: NDArray[np.uint8],
-    blocks: NDArray[np.int64],
+    text: Bytes,
+    blocks: Ints,
     pointless: bool,
     comments: bytes = b"(;",
-    fixed: NDArray[np.bool_] = FIXED,
-    odd: NDArray[np.bool_] = ODD,
+    fixed: Mask = FIXED,
+    odd: Mask = ODD,
 ) -> Scan | None:
     """As `scan`, compiled; None where there are blocks that must be taken as they are.
 
@@ -273,25 +271,25 @@ def scan_compiled(
     return Scan(keys, comment, first, spans[:count], values[:count], group)
 
 
-def odd_blocks(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list[int]:
+def odd_blocks(text: Bytes, blocks: Ints) -> list[int]:
     """The blocks that hold an `ODD` byte."""
     suspicious = np.flatnonzero((text <= ord("\r")) & (text != ord("\n")))
     places = suspicious[ODD[text[suspicious]]]
     return blocks_at(blocks, places)
 
 
-def blocks_at(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> list[int]:
+def blocks_at(blocks: Ints, places: Ints) -> list[int]:
     """The blocks in which places (k,) lie; those behind a block, at its line end, do not count."""
     owner = block_of(blocks, places)
     return owner[places < blocks[owner, 1]].tolist()
 
 
-def firsts(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+def firsts(counts: Ints) -> Ints:
     """The first number of each block (n,) with so many of them, and how many there are, (n + 1,)."""
     return np.concatenate(([0], np.cumsum(counts)))
 
 
-def block_of(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.int64]:
+def block_of(blocks: Ints, places: Ints) -> Ints:
     """The blocks in which some bytes of the text stand; those of a line end stand in the block before it."""
     return np.searchsorted(blocks[:, 0], places, side="right") - 1
 
@@ -309,12 +307,12 @@ def matches(pattern: re.Pattern[bytes], source: bytes, heads: bytes) -> Iterator
 
 
 def shape_keys(
-    text: NDArray[np.uint8],
-    blocks: NDArray[np.int64],
-    numbers: NDArray[np.int64],
-    comments: NDArray[np.int64],
-    marks: NDArray[np.uint8],
-    covered: NDArray[np.bool_],
+    text: Bytes,
+    blocks: Ints,
+    numbers: Ints,
+    comments: Ints,
+    marks: Bytes,
+    covered: Mask,
 ) -> bytes:
     """The key of each block and a line feed: its bytes, with one mark for each number and for the comment at its end.
 
@@ -335,7 +333,7 @@ KINDS = 16
 """So many of the different keys are sought among all others; the rest are rare."""
 
 
-def distinct(keys: bytes) -> tuple[list[bytes | None], NDArray[np.int64]]:
+def distinct(keys: bytes) -> tuple[list[bytes | None], Ints]:
     """The different ones of some keys, each with a line feed; rare ones more than once. And which one each of them is.
 
     They are compared eight characters at a time, from the last one on.
@@ -360,7 +358,7 @@ def distinct(keys: bytes) -> tuple[list[bytes | None], NDArray[np.int64]]:
     return [keys[slice(*edges)] for edges in zip(starts[rows].tolist(), stops[rows].tolist(), strict=True)], group
 
 
-def without_point(text: NDArray[np.uint8], numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
+def without_point(text: Bytes, numbers: Ints) -> Mask:
     """Which numbers have no decimal point, (m,)."""
     points = np.concatenate(([0], np.cumsum(text == POINT)))
     return np.asarray(points[numbers[:, 1]] == points[numbers[:, 0]])

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import core
+from ncfix.arrays import Array, Bytes, Ints, Mask
 from ncfix.text.numbers import EIGHT, POINT, POWERS, SIGN, digits_of
 from ncfix.values import frozen
 
@@ -137,10 +138,6 @@ class Spelling:
         return text.replace(".", ",") if comma else text
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Mask = NDArray[np.bool_]
-
 MOST_DECIMALS = 9
 """Decimals that are written in bulk; a number with more goes one by one."""
 LONGEST = 2 * EIGHT
@@ -165,19 +162,19 @@ def rules() -> NumberRules:
 class Styles:
     """The manner of m numbers, as in `NumberStyle`; `clear` (m,): nothing but a sign, digits and a point."""
 
-    decimals: IntArray
+    decimals: Ints
     point: Mask
     plus: Mask
     leading_zero: Mask
-    width: IntArray
+    width: Ints
     clear: Mask
 
-    def rows(self, rows: IntArray) -> Styles:
+    def rows(self, rows: Ints) -> Styles:
         """Some of them."""
         return Styles(*(getattr(self, name).take(rows) for name in self.__dataclass_fields__))
 
 
-def styles_of(text: NDArray[np.uint8], spans: IntArray, *, signed: bool = False) -> Styles:
+def styles_of(text: Bytes, spans: Ints, *, signed: bool = False) -> Styles:
     """The styles of the numbers at `spans` (m, 2); `signed`: what had a sign keeps one, whichever."""
     low, high = (int(spans[:, 0].min()), int(spans[:, 1].max())) if len(spans) else (0, 0)
     text, spans = text[low:high], spans - low
@@ -210,13 +207,13 @@ class NumberColumns:
     """
 
     heads: NDArray[np.uint32]
-    sign: NDArray[np.uint8]
+    sign: Bytes
     steps: NDArray[np.uint32]
-    decimals: IntArray
-    least: IntArray
+    decimals: Ints
+    least: Ints
     point: Mask
 
-    def and_then(self, other: NumberColumns, order: IntArray) -> NumberColumns:
+    def and_then(self, other: NumberColumns, order: Ints) -> NumberColumns:
         """These numbers and others behind them, all put in an order."""
         names = self.__dataclass_fields__
         return NumberColumns(*(np.concatenate((getattr(self, k), getattr(other, k))).take(order) for k in names))
@@ -227,10 +224,10 @@ class Texts:
     """Numbers as text: their bytes, one number after the other, and how many each of them takes, (m,)."""
 
     data: bytes
-    length: IntArray
+    length: Ints
 
 
-def is_plain(values: FloatArray, decimals: IntArray) -> Mask:
+def is_plain(values: Array, decimals: Ints) -> Mask:
     """Which of values (n,) can be written in bulk with `decimals` (n,): not too large, clearly nearer to one output."""
     with np.errstate(invalid="ignore"):
         steps = np.abs(values) * POWERS.take(decimals)
@@ -239,13 +236,13 @@ def is_plain(values: FloatArray, decimals: IntArray) -> Mask:
     return plain
 
 
-def rounded(values: FloatArray, decimals: IntArray | int) -> FloatArray:
+def rounded(values: Array, decimals: Ints | int) -> Array:
     """What a reader makes of values (n,) written with so many decimals (for those that are `is_plain`)."""
     scale = POWERS.take(decimals)
     return np.rint(values * scale) / scale + 0.0
 
 
-def in_style(values: FloatArray, styles: Styles, decimals: IntArray) -> NumberColumns:
+def in_style(values: Array, styles: Styles, decimals: Ints) -> NumberColumns:
     """Values in the styles of written numbers, as `NumberStyle.write` does it; all `is_plain`, all `clear`."""
     places = np.maximum(decimals, styles.decimals)
     steps = _steps(values, places)
@@ -260,7 +257,7 @@ def in_style(values: FloatArray, styles: Styles, decimals: IntArray) -> NumberCo
     return NumberColumns(np.zeros(len(steps), np.uint32), sign, steps, places, least, styles.point | (places > 0))
 
 
-def plain(values: FloatArray, decimals: IntArray, heads: NDArray[np.uint8], *, signed: bool = False) -> NumberColumns:
+def plain(values: Array, decimals: Ints, heads: Bytes, *, signed: bool = False) -> NumberColumns:
     """Values with exactly so many decimals, as `f"{value:.{decimals}f}"` does it; all `is_plain`.
 
     heads   (m, 4) bytes to put before each, 0 for none
@@ -274,7 +271,7 @@ def plain(values: FloatArray, decimals: IntArray, heads: NDArray[np.uint8], *, s
     )
 
 
-def _steps(values: FloatArray, decimals: IntArray) -> NDArray[np.uint32]:
+def _steps(values: Array, decimals: Ints) -> NDArray[np.uint32]:
     """How many output steps values are, the sign left out; all less than `LARGEST`."""
     return np.rint(np.abs(values) * POWERS.take(decimals)).astype(np.uint32)
 
@@ -302,7 +299,7 @@ def laid_out(numbers: NumberColumns) -> Texts:
     return Texts(without_zeros([*heads, numbers.sign, *before, point, *behind]), length)
 
 
-def _digits(values: NDArray[Any]) -> IntArray:
+def _digits(values: NDArray[Any]) -> Ints:
     """How many digits whole numbers have; 0 has none."""
     found = np.zeros(len(values), dtype=np.int64)
     for place in range(len(str(int(values.max(initial=0))))):

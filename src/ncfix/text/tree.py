@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints
 from ncfix.diagnostics import Place
 from ncfix.values import frozen
 
@@ -279,10 +280,10 @@ class Program:
     dialect: Dialect
     templates: tuple[Template, ...]
     template: NDArray[np.int32]
-    blocks: NDArray[np.int64]
-    first_number: NDArray[np.int64]
-    number_spans: NDArray[np.int64]
-    numbers: NDArray[np.float64]
+    blocks: Ints
+    first_number: Ints
+    number_spans: Ints
+    numbers: Array
     first_line: int = 1
     line_end: bytes = b"\n"
     _lines_ended: int = field(default=-1, init=False, repr=False, compare=False)
@@ -303,11 +304,11 @@ class Program:
         """The items of a block."""
         return self.template_of(block).items
 
-    def values_of(self, block: int) -> NDArray[np.float64]:
+    def values_of(self, block: int) -> Array:
         """The values of the block's numbers, by slot, (k,), as written."""
         return self.numbers[self.first_number[block] : self.first_number[block + 1]]
 
-    def column(self, address: str) -> NDArray[np.float64]:
+    def column(self, address: str) -> Array:
         """The plain numbers after an address, (n,), one for each block; NaN where there is none, or not a plain one."""
         slot = np.array([template.slots.get(address, -1) for template in self.templates], dtype=np.int64)[self.template]
         values = np.full(len(self), np.nan)
@@ -350,7 +351,7 @@ class Program:
             return self.lines_ended - _counted(self.source, character, stop)
         return _counted(self.source, character, 0, stop)
 
-    def lines(self, blocks: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
+    def lines(self, blocks: NDArray[np.integer[Any]]) -> Ints:
         """The line numbers on which blocks (n,) start, all at once."""
         text = np.frombuffer(self.source, dtype=np.uint8)
         ends = np.flatnonzero(text == ord("\n" if b"\n" in self.source else "\r"))

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix import core
+from ncfix.arrays import Ints
 from ncfix.values import frozen
 
 
@@ -54,9 +54,9 @@ class Splices:
     data         the replacements, one after the other
     """
 
-    start: NDArray[np.int64]
-    stop: NDArray[np.int64]
-    length: NDArray[np.int64]
+    start: Ints
+    stop: Ints
+    length: Ints
     data: bytes
 
     def __len__(self) -> int:
@@ -91,7 +91,7 @@ class Splices:
         """These splices so many bytes further on."""
         return replace(self, start=self.start + way, stop=self.stop + way)
 
-    def outside(self, spans: NDArray[np.int64]) -> Splices:
+    def outside(self, spans: Ints) -> Splices:
         """The splices that are not within spans (k, 2) of the source, which are apart from each other; in any order."""
         starts, stops = np.sort(spans, axis=0).T
         at = np.searchsorted(starts, self.start, side="right") - 1
@@ -125,7 +125,7 @@ def spliced(source: bytes, splices: Splices) -> bytes:
     return apply(source, tuple(splices.edits()))
 
 
-def overlong(source: bytes, blocks: NDArray[np.int64], splices: Splices, limit: int) -> dict[int, int]:
+def overlong(source: bytes, blocks: Ints, splices: Splices, limit: int) -> dict[int, int]:
     """Blocks (n, 2) of which edits make a line of more than `limit` characters, and how many; 0 is no limit."""
     if not limit or not len(splices):
         return {}

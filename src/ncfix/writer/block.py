@@ -13,15 +13,13 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.text.layout import ABSOLUTE, CENTRE_LETTERS, INCREMENT, Layout
 from ncfix.text.spelling import Spelling, value_of
 from ncfix.text.tree import Literal, Program, Word
 from ncfix.writer.block_text import BlockText
 from ncfix.writer.target import LINE, TANGENTIAL, Rendered, Target, feed_number, feed_way
-
-FloatArray = NDArray[np.float64]
 
 FEED_DECIMALS = 3
 """F words of shares of a block in G93 keep the time of the block to this many decimals at least."""
@@ -82,7 +80,7 @@ class BlockWriter(BlockText):
 
     # -- the block itself ---------------------------------------------------------------------------------------------
 
-    def _first_piece(self, position: FloatArray, end: FloatArray) -> FloatArray:
+    def _first_piece(self, position: Array, end: Array) -> Array:
         self._motion_code()
         base = position.copy()
         self._axis_words(position, end, self._closed(position, end))
@@ -125,9 +123,9 @@ class BlockWriter(BlockText):
 
     def _axis_words(
         self,
-        position: FloatArray,
-        end: FloatArray,
-        closed: NDArray[np.bool_] | None = None,
+        position: Array,
+        end: Array,
+        closed: Mask | None = None,
         skipped: Sequence[int] = (),
     ) -> None:
         """Put the words of the axes right, and `position` where they lead; `closed` (n_axes,) stay where they are."""
@@ -142,7 +140,7 @@ class BlockWriter(BlockText):
             elif self._may_add(column):
                 self._absent_axis(position, column, end[column])
 
-    def _present_axis(self, position: FloatArray, column: int, end: float, word: Word) -> None:
+    def _present_axis(self, position: Array, column: int, end: float, word: Word) -> None:
         start, turns = float(position[column]), 0.0
         form = self.layout.forms.get(word.address, "")
         increment = form == INCREMENT or (not form and self.incremental)
@@ -164,7 +162,7 @@ class BlockWriter(BlockText):
         began = target.origin[target.spatial.index(column)] if column in target.spatial else np.nan
         return float(target.nominal[column] - began)
 
-    def _counted_from(self, position: FloatArray, column: int) -> float:
+    def _counted_from(self, position: Array, column: int) -> float:
         """Where an increment counts from; in turned coordinates one axis that stands nowhere known hides them all."""
         if not np.isfinite(position[column]):
             self.out.conflict = self.out.conflict or FROM_NOWHERE
@@ -174,10 +172,10 @@ class BlockWriter(BlockText):
         """Where an absolute word may lead an axis that is to go to the end of a piece."""
         return end
 
-    def _arrive(self, position: FloatArray, column: int, start: float, end: float, word: Word) -> None:
+    def _arrive(self, position: Array, column: int, start: float, end: float, word: Word) -> None:
         """See that the word just written leads the axis to where it says."""
 
-    def _absent_axis(self, position: FloatArray, column: int, end: float) -> None:
+    def _absent_axis(self, position: Array, column: int, end: float) -> None:
         end = self._reachable(column, end)
         near = abs(end - position[column]) < self.half[column] and not self._must_name(column)
         if near or not np.isfinite(end):
@@ -185,7 +183,7 @@ class BlockWriter(BlockText):
         base = position[column] if self.incremental else 0.0
         position[column] = base + self._add(self.target.letters[column], end - base, int(self.target.decimals[column]))
 
-    def _step(self, position: FloatArray, column: int, end: float) -> str:
+    def _step(self, position: Array, column: int, end: float) -> str:
         """The number of a new axis word that leads to `end`, and `position` there."""
         base = position[column] if self.incremental else 0.0
         text = self.spelling.number(end - base, int(self.target.decimals[column]))
@@ -201,7 +199,7 @@ class BlockWriter(BlockText):
         """Whether an axis gets a word even if it stands where that leads it."""
         return bool(self.target.spelled) and self.target.spelled[column]
 
-    def _name_a_place(self, position: FloatArray) -> None:
+    def _name_a_place(self, position: Array) -> None:
         """A word for where an axis stands: the first line of what was an arc is a motion, even if it goes nowhere."""
         for column, letter in self.columns:
             if self._may_add(column) and np.isfinite(position[column]):
@@ -209,7 +207,7 @@ class BlockWriter(BlockText):
                 position[column] = base + self._add(letter, position[column] - base, int(self.target.decimals[column]))
                 return
 
-    def _closed(self, position: FloatArray, end: FloatArray) -> NDArray[np.bool_]:
+    def _closed(self, position: Array, end: Array) -> Mask:
         """The axes of the plane of a full circle: it has to end where it starts to the last digit.
 
         An output step beside it, a control would make an arc of a thousandth of a degree of it.
@@ -222,7 +220,7 @@ class BlockWriter(BlockText):
             closed[plane] = np.linalg.norm(((end - position) / target.resolved)[plane]) < NEAR
         return closed
 
-    def _stay(self, position: FloatArray, column: int, word: Word | None) -> None:
+    def _stay(self, position: Array, column: int, word: Word | None) -> None:
         """An axis that ends where it starts; a word that cannot say so to the last digit is left out."""
         if word is None:
             return
@@ -254,14 +252,14 @@ class BlockWriter(BlockText):
 
     # -- arcs ---------------------------------------------------------------------------------------------------------
 
-    def _arc_words(self, start: FloatArray, end: FloatArray) -> None:
+    def _arc_words(self, start: Array, end: Array) -> None:
         if self.target.arc:
             self._kept_arc(start, end)
         elif np.isfinite(self.target.original_centre).any():
             for word in (*self.layout.centre.values(), self.layout.radius, self.layout.turns):
                 self._remove(word)
 
-    def _kept_arc(self, start: FloatArray, end: FloatArray) -> None:
+    def _kept_arc(self, start: Array, end: Array) -> None:
         """Centre words of an arc that stays one; an R that no longer says which centre is meant gives way to I J K."""
         target = self.target
         centre = target.centre.copy()
@@ -301,7 +299,7 @@ class BlockWriter(BlockText):
             original = 0.0
         return float(base + original)
 
-    def _centre_by_radius(self, word: Word, start: FloatArray, end: FloatArray) -> FloatArray | None:
+    def _centre_by_radius(self, word: Word, start: Array, end: Array) -> Array | None:
         """The centre that the radius as written means, if that is within an output step of where it belongs."""
         plane = list(self.target.plane[:2])
         radius = abs(self._value(word, np.nan))
@@ -322,7 +320,7 @@ class BlockWriter(BlockText):
         centre[plane] = nearest
         return centre
 
-    def _xyz(self, position: FloatArray) -> FloatArray:
+    def _xyz(self, position: Array) -> Array:
         """X Y Z of a position in the numbers in which centres are meant."""
         values = np.array([position[column] if column >= 0 else 0.0 for column in self.target.spatial])
         if self.target.diameter:
@@ -338,7 +336,7 @@ class BlockWriter(BlockText):
         is_arc = np.isfinite(self.target.original_centre).any()
         return self.target.code in (0, LINE) and bool(self.layout.centre) and not is_arc
 
-    def _point(self, position: FloatArray, end: FloatArray) -> None:
+    def _point(self, position: Array, end: Array) -> None:
         """Put the words of the direction right, and `position` where they take the rotary axes."""
         turning, target = list(self.turning), self.target
         if len(target.ends) == 1 and (np.abs(end - target.nominal)[turning] < self.half[turning]).all():
@@ -370,18 +368,18 @@ class BlockWriter(BlockText):
         """Decimals that say the direction well enough."""
         return max(self.spelling.vector_digits - math.floor(math.log10(self.vector_length)), 1)
 
-    def _vector(self, end: FloatArray) -> list[float]:
+    def _vector(self, end: Array) -> list[float]:
         """The direction of the tool at an end, in the program's coordinates, as it is written."""
         target = self.target
         assert target.pointing is not None
         direction = np.linalg.solve(target.rotation, target.pointing.direction(np.radians(end) + target.offset))
         return [round(float(part) * self.vector_length, self.vector_digits) for part in direction]
 
-    def _direction_words(self, end: FloatArray) -> list[str]:
+    def _direction_words(self, end: Array) -> list[str]:
         """The words of direction of a further piece."""
         return list(map(self._component, self.spelling.vector, self._vector(end)))
 
-    def _turn(self, position: FloatArray, end: FloatArray) -> None:
+    def _turn(self, position: Array, end: Array) -> None:
         """Put the rotary axes of `position` where the direction as written takes them.
 
         The control takes the posture in which the program has them; an axis that may stand anywhere stays.
@@ -396,7 +394,7 @@ class BlockWriter(BlockText):
 
     # -- further pieces -----------------------------------------------------------------------------------------------
 
-    def _further_piece(self, position: FloatArray, piece: int) -> FloatArray:
+    def _further_piece(self, position: Array, piece: int) -> Array:
         target = self.target
         end, begin, position = target.ends[piece], position, position.copy()
         arc = target.arcs is not None and bool(target.arcs[piece])
@@ -426,7 +424,7 @@ class BlockWriter(BlockText):
         self.code = wanted
         return [self._code(f"{wanted // 10}")]
 
-    def _centre_of_piece(self, piece: int, begin: FloatArray) -> list[str]:
+    def _centre_of_piece(self, piece: int, begin: Array) -> list[str]:
         """The centre words of a further piece that is an arc."""
         target, words = self.target, []
         assert target.centres is not None
@@ -461,7 +459,7 @@ class BlockWriter(BlockText):
             self.out.conflict = TOO_SHORT.format(most)
         return rate
 
-    def _time_of_turn(self, begin: FloatArray, end: FloatArray) -> None:
+    def _time_of_turn(self, begin: Array, end: Array) -> None:
         """State the time of a turn of rotary axes alone in its own block; it is taken back behind it."""
         if not self.target.turn_by_feed:
             self._feed_mode(INVERSE_TIME)
@@ -480,7 +478,7 @@ class BlockWriter(BlockText):
         else:
             self.out.edits.append((*self.program.span(self.block, code.value_span), number))
 
-    def _turn_feed(self, piece: int, begin: FloatArray, end: FloatArray) -> str:
+    def _turn_feed(self, piece: int, begin: Array, end: Array) -> str:
         """The number after F with which a piece of a turn takes its share of the time."""
         minutes = self.target.turn_minutes * float(self.target.shares[piece])
         reach = feed_way(self.target.letters, begin, end, self.target.diameter) if self.target.turn_by_feed else 1.0

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS, Layout
 from ncfix.text.spelling import Spelling, value_of
 from ncfix.text.tree import Constant, Literal, Program, Span, Word
@@ -23,7 +23,7 @@ def columns_of(letters: tuple[str, ...]) -> tuple[tuple[int, str], ...]:
 
 
 @lru_cache(maxsize=32)
-def half_steps(decimals: tuple[int, ...]) -> NDArray[np.float64]:
+def half_steps(decimals: tuple[int, ...]) -> Array:
     """(n_axes,) half an output step of axes with so many digits behind the point; not to be written to."""
     return np.asarray(0.5 * 10.0 ** -np.array(decimals, dtype=float))
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import core
+from ncfix.arrays import Array, Bytes, Ints, Mask
 from ncfix.control.moves import FeedMode, Frame, MotionKind, Moves, Rule
 from ncfix.control.turns import turns_alone
 from ncfix.text.spelling import (
@@ -29,10 +30,6 @@ from ncfix.writer.bulk_layouts import CLOSING, NONE, OPENING, Layouts, places_of
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
 from ncfix.writer.target import FrameMap
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 SWAPPED = bytes.maketrans(b".,", b",.")
 
@@ -49,9 +46,9 @@ class Bulk:
     program: Program
     moves: Moves
     pieces: Pieces
-    first_piece: IntArray
+    first_piece: Ints
     layouts: Layouts
-    stop: IntArray
+    stop: Ints
     parts: list[Splices] = field(default_factory=list)
     added: int = 0
 
@@ -90,7 +87,7 @@ class Bulk:
         return wordless if wordless.any() else None
 
     @property
-    def text(self) -> NDArray[np.uint8]:
+    def text(self) -> Bytes:
         """The source, with decimal points where it has commas."""
         comma, source = self.layouts.spelling.comma, self.program.source
         return np.frombuffer(source.translate(SWAPPED) if comma else source, dtype=np.uint8)
@@ -107,7 +104,7 @@ class Bulk:
         program: Program,
         moves: Moves,
         pieces: Pieces,
-        first_piece: IntArray,
+        first_piece: Ints,
         plain: Mask,
     ) -> Bulk | None:
         """The stretches of `plain` motions (n,), all of one frame; None if the frame does not allow any.
@@ -128,7 +125,7 @@ class Bulk:
         fit = with_dwells(fit, program, moves, pieces, first_piece, layouts)
         return cls(program, moves, pieces, first_piece, layouts, _stops(fit))
 
-    def take(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
+    def take(self, row: int, position: Array, frame: FrameMap, decimals: Ints) -> Array | None:
         """Write the stretch that begins with motion `row`, as far as it is clear, but for centres of arcs.
 
         position  (n_axes,) the command at which the control stands
@@ -151,9 +148,7 @@ class Bulk:
         self.added += len(ends) - int(np.searchsorted(self.first_piece, self.first_piece[row] + len(ends))) + row
         return ends
 
-    def turn(
-        self, rows: IntArray, ends: tuple[FloatArray, FloatArray], frame: FrameMap, decimals: IntArray
-    ) -> tuple[Mask, FloatArray]:
+    def turn(self, rows: Ints, ends: tuple[Array, Array], frame: FrameMap, decimals: Ints) -> tuple[Mask, Array]:
         """Write the centre words of arcs `rows` (k,) that were taken; of one that is not clear nothing stays written.
 
         ends  (k, n_axes) the commands at their starts and ends, as they were written
@@ -182,12 +177,10 @@ class Bulk:
         self.parts[-1] = self.parts[-1].outside(self.program.blocks[self.moves.block[rows]])
         self.added -= int(np.diff(self.first_piece)[rows].sum()) - len(rows)
 
-    def _steps_for(self, decimals: IntArray) -> OutputSteps:
+    def _steps_for(self, decimals: Ints) -> OutputSteps:
         return OutputSteps(self.text, decimals, 0.5 * 10.0 ** -decimals.astype(float), self.layouts.spelling.signed)
 
-    def _written(
-        self, row: int, position: FloatArray, frame: FrameMap, steps: OutputSteps
-    ) -> tuple[FloatArray, Splices] | None:
+    def _written(self, row: int, position: Array, frame: FrameMap, steps: OutputSteps) -> tuple[Array, Splices] | None:
         """The commands at the ends of the pieces of a stretch, (k, n_axes), and what changes in the words of axes."""
         words = core.loops("words")
         stop, program, layouts = int(self.stop[row]), self.program, self.layouts
@@ -223,7 +216,7 @@ class Bulk:
         edits, size = pen.edits, pen.size
         return commands[:done], Splices(start[:edits], end[:edits], length[:edits], data[:size].tobytes())
 
-    def _room(self, pieces: IntArray, blocks: NDArray[np.int32], words: int) -> int:
+    def _room(self, pieces: Ints, blocks: NDArray[np.int32], words: int) -> int:
         """Bytes that the words and lines of some motions take at most; `words`: those of a piece."""
         lines, line = int(pieces[-1] - pieces[0]), words + len(b"\r\n") + OPENING + CLOSING
         if not self.layouts.lined:
@@ -234,7 +227,7 @@ class Bulk:
         return lines * line + int((several[several > 0] * leads).sum())
 
 
-def _stops(fit: Mask) -> IntArray:
+def _stops(fit: Mask) -> Ints:
     """(n + 1,) for each motion, and behind the last one, the first from there on that is not `fit` (n,)."""
     ends = np.append(np.flatnonzero(~fit), len(fit))
     return np.repeat(ends, np.diff(ends, prepend=-1))
@@ -251,9 +244,7 @@ def _is_plain(frame: Frame) -> bool:
 # end elsewhere, by some digits; what behind one relies on that, having no word for an axis, is written by itself, too.
 
 
-def write_alone(
-    arcs: Sequence[int], stop: int, start: FloatArray, named: Mask, write: Callable[[int], FloatArray]
-) -> list[int]:
+def write_alone(arcs: Sequence[int], stop: int, start: Array, named: Mask, write: Callable[[int], Array]) -> list[int]:
     """Write arcs of a stretch that ends before motion `stop`, in order, and what relies on where they end.
 
     start  (n, n_axes) the commands at which motions begin; put right
@@ -278,7 +269,7 @@ def write_alone(
 # -- which motions may be written all at once, as far as their own data say -------------------------------------------
 
 
-def qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts) -> Mask:
+def qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: Ints, layouts: Layouts) -> Mask:
     """(n,) straight motions and arcs that may be written in bulk; `first_piece` (n + 1,) as in `Bulk`."""
     first = first_piece[:-1]
     fit: Mask = ((moves.kind == MotionKind.RAPID) & (moves.modal == 0)) | (
@@ -294,7 +285,7 @@ def qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntAr
     return fit
 
 
-def sound(moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
+def sound(moves: Moves, pieces: Pieces, first_piece: Ints) -> Mask:
     """(n,) motions that are corrected, from absolute words to where all is known."""
     first = first_piece[:-1]
     fit: Mask = (moves.rule == Rule.CORRECT) & ~moves.incremental & ~pieces.unchanged[first] & pieces.known[first]
@@ -304,9 +295,7 @@ def sound(moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
     return fit
 
 
-def with_dwells(
-    fit: Mask, program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts
-) -> Mask:
+def with_dwells(fit: Mask, program: Program, moves: Moves, pieces: Pieces, first_piece: Ints, layouts: Layouts) -> Mask:
     """Motions `fit` (n,), and dwells just behind them at which the axes shall stand where these leave them.
 
     Nothing is written of such a dwell: its block is its own, and none of its numbers is the place of an axis (times and
@@ -323,7 +312,7 @@ def with_dwells(
     return found
 
 
-def _writable_pieces(program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts) -> Mask:
+def _writable_pieces(program: Program, moves: Moves, pieces: Pieces, first_piece: Ints, layouts: Layouts) -> Mask:
     """(n,) motions in one straight piece; in several, if nothing but words goes with them."""
     single: Mask = (np.diff(first_piece) == 1) & ~pieces.arc[first_piece[:-1]]
     several = np.flatnonzero(~single)

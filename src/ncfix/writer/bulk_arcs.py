@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Bytes, Ints, Mask
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.text.spelling import Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
 from ncfix.text.tree import Program
@@ -19,10 +19,6 @@ from ncfix.values import frozen
 from ncfix.writer.bulk_layouts import NONE, Layouts, places_of
 from ncfix.writer.pieces import Pieces
 from ncfix.writer.target import FrameMap
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 PLANES = np.array(((1, 2), (2, 0), (0, 1)))
 """The axes of a plane, X Y Z being 0 1 2, in the order in which their words are added; by the one across it."""
@@ -34,7 +30,7 @@ TIE = 1e-4
 """Half output steps: so near to the distance allowed between centres, the side that it is on is for `BlockWriter`."""
 
 
-def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: IntArray, layouts: Layouts) -> Mask:
+def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: Ints, layouts: Layouts) -> Mask:
     """(n,) arcs that become one arc, and whose words are such that it may be written in bulk.
 
     Those that `BlockWriter` writes by themselves may become more than that.
@@ -56,13 +52,13 @@ def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: IntArray, 
     return fit
 
 
-def _planes(moves: Moves, rows: IntArray) -> IntArray:
+def _planes(moves: Moves, rows: Ints) -> Ints:
     """(k, 2) the axes of the planes of arcs `rows`, X Y Z being 0 1 2, in a frame that is not turned."""
-    planes: IntArray = PLANES.take(np.abs(moves.normal[rows]).argmax(axis=1), axis=0)
+    planes: Ints = PLANES.take(np.abs(moves.normal[rows]).argmax(axis=1), axis=0)
     return planes
 
 
-def _spatial(moves: Moves) -> IntArray:
+def _spatial(moves: Moves) -> Ints:
     """The columns of X, Y and Z."""
     return np.array([moves.axes.index(letter) for letter in "XYZ"])
 
@@ -75,9 +71,9 @@ class OutputSteps:
     signed          with a sign
     """
 
-    text: NDArray[np.uint8]
-    decimals: IntArray
-    half: FloatArray
+    text: Bytes
+    decimals: Ints
+    half: Array
     signed: bool
 
 
@@ -96,16 +92,16 @@ class CentreWords:
     clear    (k,) all that is clear to the last digit
     """
 
-    block: IntArray
-    plane: IntArray
-    words: IntArray
-    wanted: FloatArray
-    decimals: IntArray
+    block: Ints
+    plane: Ints
+    words: Ints
+    wanted: Array
+    decimals: Ints
     rewrite: Mask
     styles: Styles
     add: Mask
     given_up: Mask
-    centre: FloatArray
+    centre: Array
     clear: Mask
 
     @classmethod
@@ -114,9 +110,9 @@ class CentreWords:
         program: Program,
         layouts: Layouts,
         moves: Moves,
-        rows: IntArray,
-        ends: tuple[FloatArray, FloatArray],
-        centre: FloatArray,
+        rows: Ints,
+        ends: tuple[Array, Array],
+        centre: Array,
         frame: FrameMap,
         steps: OutputSteps,
     ) -> CentreWords:
@@ -192,9 +188,7 @@ class CentreWords:
         return Splices.joined([words, Splices(gone[0], gone[1], np.zeros(len(rows), np.int64), b"")])
 
 
-def _nearest_centre(
-    radius: FloatArray, start: FloatArray, end: FloatArray, wanted: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _nearest_centre(radius: Array, start: Array, end: Array, wanted: Array) -> tuple[Array, Array]:
     """The centre (k, 2) that a radius means, of the two the one nearer to `wanted`, and how far off it is, (k,).
 
     As `block.BlockWriter._centre_by_radius`. Infinitely far where there is no radius (NaN), or none that reaches.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Bytes, Ints, Mask
 from ncfix.control.moves import Moves
 from ncfix.text.language import BulkLayout
 from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
@@ -14,9 +14,6 @@ from ncfix.text.spelling import Spelling
 from ncfix.text.tree import START, Program
 from ncfix.values import frozen
 from ncfix.writer.language import WrittenLanguage
-
-IntArray = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
 
 OPENING, CLOSING = 4, 8
 """Bytes that stand at most before and behind the axis words of a further piece."""
@@ -52,28 +49,28 @@ class Layouts:
     lined      lines of further pieces begin with more than axis words
     """
 
-    known: NDArray[np.bool_]
-    further: NDArray[np.bool_]
-    slots: IntArray
-    by_place: IntArray
-    by_letter: IntArray
-    anchors: IntArray
-    heads: NDArray[np.uint8]
-    leads: IntArray
-    openings: NDArray[np.uint8]
-    closings: NDArray[np.uint8]
-    round: NDArray[np.bool_]
-    centre: IntArray
-    fixed: NDArray[np.bool_]
-    centre_heads: NDArray[np.uint8]
-    radius: IntArray
-    taken: IntArray
-    alone: NDArray[np.bool_]
+    known: Mask
+    further: Mask
+    slots: Ints
+    by_place: Ints
+    by_letter: Ints
+    anchors: Ints
+    heads: Bytes
+    leads: Ints
+    openings: Bytes
+    closings: Bytes
+    round: Mask
+    centre: Ints
+    fixed: Mask
+    centre_heads: Bytes
+    radius: Ints
+    taken: Ints
+    alone: Mask
     spelling: Spelling
     lined: bool = False
 
     @property
-    def arrays(self) -> tuple[IntArray, IntArray, IntArray, IntArray, Bytes, IntArray, Bytes, Bytes]:
+    def arrays(self) -> tuple[Ints, Ints, Ints, Ints, Bytes, Ints, Bytes, Bytes]:
         """What the compiled core goes by."""
         text = self.openings, self.closings
         return self.slots, self.by_place, self.by_letter, self.anchors, self.heads, self.leads, *text
@@ -139,16 +136,16 @@ class Layouts:
             if arc.radius is not None:
                 self.radius[shape], self.taken[shape] = arc.radius
 
-    def places(self, program: Program, blocks: IntArray) -> IntArray:
+    def places(self, program: Program, blocks: Ints) -> Ints:
         """The bytes of `blocks` (k,) at which missing words go."""
         return places_of(program, blocks, self.anchors)
 
 
-def places_of(program: Program, blocks: IntArray, anchors: IntArray) -> IntArray:
+def places_of(program: Program, blocks: Ints, anchors: Ints) -> Ints:
     """The bytes of `blocks` (k,) that anchors (s, 2), those of each shape, stand for."""
     slot, offset = anchors[program.template[blocks]].T
     edges = program.blocks[blocks, np.where(slot == START, 0, 1)]
     behind = slot >= 0
     edges[behind] = program.number_spans[program.first_number[blocks[behind]] + slot[behind], 1]
-    places: IntArray = edges + offset
+    places: Ints = edges + offset
     return places

@@ -11,8 +11,8 @@ import math
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.control.moves import FeedMode, Kinematics, MotionKind, Moves, Rule
 from ncfix.control.tcp import jumps, passed_through, renamed
 from ncfix.control.turns import UNTIMED, minutes, turn_alone, turns_alone, written_feed
@@ -25,8 +25,6 @@ from ncfix.writer.bulk import Bulk, write_alone
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces, SecondReading
 from ncfix.writer.target import TANGENTIAL, FrameMap, Rendered, RetractLevels, Target, plane_across
-
-FloatArray = NDArray[np.float64]
 
 NOWHERE = np.full(3, np.nan)
 SEVERAL_STATES = "the block is executed from several states that need different corrections"
@@ -49,9 +47,9 @@ class Emission:
     """
 
     splices: Splices
-    end: FloatArray
-    centre: FloatArray
-    start: FloatArray
+    end: Array
+    centre: Array
+    start: Array
     conflicts: dict[int, str]
     added_blocks: int
     timed: tuple[int, ...] = ()
@@ -66,9 +64,9 @@ def emit(
     program: Program,
     moves: Moves,
     pieces: Pieces,
-    least_increment: FloatArray,
+    least_increment: Array,
     reading: SecondReading | None = None,
-    done: FloatArray | None = None,
+    done: Array | None = None,
     kinematics: Kinematics | None = None,
     bulk: Bulk | None = None,
 ) -> Emission:
@@ -107,7 +105,7 @@ class _Emitter:
         program: Program,
         moves: Moves,
         pieces: Pieces,
-        least_increment: FloatArray,
+        least_increment: Array,
         reading: SecondReading,
         kinematics: Kinematics | None,
         bulk: Bulk | None,
@@ -131,7 +129,7 @@ class _Emitter:
         self.layouts: dict[int, BlockLayout | None] = {}
         self.position = moves.start[0].copy() if len(moves) else np.zeros(0)
         self.replaced: int | None = None
-        self.cycle_end: FloatArray | None = None
+        self.cycle_end: Array | None = None
         self.levels = RetractLevels(moves, pieces)
         self.written: dict[int, Rendered] = {}
         self.latest, self.timed, self.added = list[int](), list[int](), 0
@@ -139,7 +137,7 @@ class _Emitter:
         self.conflicts, self.replaced_by = dict[int, str](), -1
         self.end, self.centre, self.start = pieces.end.copy(), pieces.centre.copy(), moves.start.copy()
 
-    def run(self, done: FloatArray | None, row: int) -> Emission:
+    def run(self, done: Array | None, row: int) -> Emission:
         """Walk all motions from `row` on; the control stands at `done` (n_axes,) there, if that is given."""
         self.position = self.position if done is None else done.copy()
         while row < len(self.moves):
@@ -169,12 +167,12 @@ class _Emitter:
         return Emission(splices, self.end, self.centre, self.start, self.conflicts, added, tuple(self.timed))
 
     @cached_property
-    def moved(self) -> NDArray[np.bool_]:
+    def moved(self) -> Mask:
         """(n, n_axes) axes that a motion takes to its end; found out at the first unchanged motion."""
         return self.moves.moved
 
     @cached_property
-    def turns(self) -> NDArray[np.bool_]:
+    def turns(self) -> Mask:
         """(n,) motions that turn rotary axes alone."""
         return turns_alone(self.moves)
 
@@ -202,7 +200,7 @@ class _Emitter:
         self.position = self.end[first + len(ends) - 1].copy()
         return stop - row
 
-    def _written(self, row: int) -> FloatArray:
+    def _written(self, row: int) -> Array:
         """Write a motion by itself from its start on; the command at its end."""
         self.position, self.replaced = self.start[row], None
         (self._leave if self.pieces.unchanged[self.first_piece[row]] else self._write)(row)
@@ -257,7 +255,7 @@ class _Emitter:
         if self.relies[row]:
             self._check_code(row)
 
-    def _unchanged_end(self, row: int) -> FloatArray:
+    def _unchanged_end(self, row: int) -> Array:
         moves = self.moves
         if self.reading.end is not None:
             return np.asarray(self.reading.end[row])
@@ -377,7 +375,7 @@ class _Emitter:
             return float("nan")
         return minutes(self.moves, row)
 
-    def _before(self, row: int) -> FloatArray:
+    def _before(self, row: int) -> Array:
         """Where axes stand that the block does not name; in a canned cycle the depth of the last hole counts."""
         if self.cycle_end is not None and self.kind[row] == MotionKind.CYCLE:
             return self.cycle_end

@@ -9,9 +9,7 @@ from ncfix.control.interpreter import FollowedLanguage
 from ncfix.values import frozen
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from ncfix.arrays import Ints, Mask
     from ncfix.control.moves import Moves
     from ncfix.text.spelling import Spelling
     from ncfix.text.tree import Program
@@ -41,5 +39,5 @@ class WrittenLanguage(FollowedLanguage):
 
     writer: Callable[[Program, int, Any, Target, Spelling], Writer]
     arc_pieces: bool = False
-    one_by_one: Callable[[Program, Moves, Pieces, NDArray[np.int64]], NDArray[np.bool_]] | None = None
+    one_by_one: Callable[[Program, Moves, Pieces, Ints], Mask] | None = None
     held_angle: Callable[[bytes, str, float, float, float], float] | None = None

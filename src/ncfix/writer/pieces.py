@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index, Ints, Mask
 from ncfix.control.moves import Frame, MotionKind, Moves, Rule
 from ncfix.values import frozen
 
@@ -36,42 +37,42 @@ class Pieces:
     approach   (m, n_axes) of canned cycles: the command at the level R, as `Moves.approach`; None: nowhere
     """
 
-    move: NDArray[np.int64]
-    fraction: NDArray[np.float64]
-    end: NDArray[np.float64]
-    arc: NDArray[np.bool_]
-    centre: NDArray[np.float64]
-    unchanged: NDArray[np.bool_]
-    share: NDArray[np.float64] | None = None
-    approach: NDArray[np.float64] | None = None
+    move: Ints
+    fraction: Array
+    end: Array
+    arc: Mask
+    centre: Array
+    unchanged: Mask
+    share: Array | None = None
+    approach: Array | None = None
 
     def __len__(self) -> int:
         return len(self.move)
 
-    def rows(self, rows: NDArray[np.intp]) -> Pieces:
+    def rows(self, rows: Index) -> Pieces:
         """Some of the pieces."""
         columns: dict[str, Any] = {each.name: getattr(self, each.name) for each in fields(self)}
         return replace(self, **{name: column[rows] for name, column in columns.items() if column is not None})
 
     @property
-    def first(self) -> NDArray[np.intp]:
+    def first(self) -> Index:
         """(n,) the first piece of each motion."""
         return np.flatnonzero(np.diff(self.move, prepend=-1))
 
     @property
-    def last(self) -> NDArray[np.intp]:
+    def last(self) -> Index:
         """(n,) the last one."""
         return np.flatnonzero(np.diff(self.move, append=self.move[-1:] + 1))
 
     @property
-    def begun(self) -> NDArray[np.float64]:
+    def begun(self) -> Array:
         """(m,) where on its motion each piece begins, as `fraction` says where it ends."""
         begun = np.append(0.0, self.fraction)[:-1]
         begun[self.first] = 0.0
         return begun
 
     @property
-    def known(self) -> NDArray[np.bool_]:
+    def known(self) -> Mask:
         """(m,) the command at the end is known in all axes."""
         finite = np.isfinite(self.end)
         return np.ones(len(self), dtype=np.bool_) if finite.all() else np.asarray(finite.all(axis=1))
@@ -89,8 +90,8 @@ class SecondReading:
 
     frame: NDArray[np.int32]
     frames: tuple[Frame, ...]
-    start: NDArray[np.float64] | None = None
-    end: NDArray[np.float64] | None = None
+    start: Array | None = None
+    end: Array | None = None
 
     @classmethod
     def of(cls, moves: Moves, pieces: Pieces) -> SecondReading:
@@ -98,8 +99,6 @@ class SecondReading:
         last = pieces.last
         return cls(moves.frame[last], moves.frames, moves.start[pieces.first], moves.end[last])
 
-
-Mask = NDArray[np.bool_]
 
 PINNED = "a refused arc that follows starts from its end"
 BEYOND_TRAVEL = "a refused increment that follows would leave the travel"
@@ -149,7 +148,7 @@ class _Walk:
         self.anchored = bound & ~self.passed
         self.anchored[arcs] |= ~self._floating(arcs) & ~self.passed[arcs]
 
-    def _floating(self, arcs: NDArray[np.intp]) -> Mask:
+    def _floating(self, arcs: Index) -> Mask:
         """Which arcs (k,) have both end and centre that count from where they start, full circles among them."""
         moves = self.moves
         named = [self.absolute[arcs, column] for column in self.columns if column >= 0]

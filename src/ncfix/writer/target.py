@@ -14,15 +14,13 @@ from dataclasses import field, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.control.moves import CycleCall, Frame, Moves
 from ncfix.control.pointing import Pointing
 from ncfix.text.spelling import decimals_for
 from ncfix.values import frozen, mutable
 from ncfix.writer.pieces import Pieces
-
-FloatArray = NDArray[np.float64]
 
 LINE = 10
 """The code of straight motions at feed, in tenths."""
@@ -102,36 +100,36 @@ class Target:
     """
 
     letters: tuple[str, ...]
-    resolved: FloatArray
-    decimals: NDArray[np.int64]
-    start: FloatArray
-    nominal: FloatArray
-    original: FloatArray
-    ends: FloatArray
+    resolved: Array
+    decimals: Ints
+    start: Array
+    nominal: Array
+    original: Array
+    ends: Array
     arc: bool
-    centre: FloatArray
-    original_centre: FloatArray
-    origin: FloatArray
+    centre: Array
+    original_centre: Array
+    origin: Array
     plane: tuple[int, int, int]
     spatial: tuple[int, int, int]
     diameter: bool
     incremental: bool
     centre_absolute: bool
-    shares: FloatArray
+    shares: Array
     inverse_time: bool
     code: int
     active_code: int
     feed: float
     turn_minutes: float
     turn_by_feed: bool
-    arcs: NDArray[np.bool_] | None
-    centres: FloatArray | None
+    arcs: Mask | None
+    centres: Array | None
     arc_code: int
     increments: tuple[float, float]
     rotary: tuple[bool, ...]
     pointing: Pointing | None
-    rotation: FloatArray
-    offset: FloatArray
+    rotation: Array
+    offset: Array
     level: Level | None
     wordless: tuple[bool, ...]
     call: CycleCall | None
@@ -186,9 +184,9 @@ class Rendered:
 
     edits: list[tuple[int, int, str]] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
-    ends: list[FloatArray] = field(default_factory=list)
-    centre: FloatArray | None = None
-    centres: dict[int, FloatArray] = field(default_factory=dict)
+    ends: list[Array] = field(default_factory=list)
+    centre: Array | None = None
+    centres: dict[int, Array] = field(default_factory=dict)
     level: float | None = None
     conflict: str = ""
     code: int | None = None
@@ -206,13 +204,13 @@ class Rendered:
         return (tuple(self.edits), tuple(self.lines), self.closing)
 
 
-def plane_across(normal: FloatArray) -> tuple[int, int, int]:
+def plane_across(normal: Array) -> tuple[int, int, int]:
     """The two columns of an arc's plane and the one across it, from the plane's normal in program axes."""
     across = int(np.argmax(np.abs(normal)))
     return ((1, 2, 0), (2, 0, 1), (0, 1, 2))[across]
 
 
-def feed_way(letters: tuple[str, ...], begin: FloatArray, end: FloatArray, diameter: bool) -> float:
+def feed_way(letters: tuple[str, ...], begin: Array, end: Array, diameter: bool) -> float:
     """The way that F is the speed of, in program units: of linear axes, of rotary axes where none of those moves.
 
     begin, end  (n_axes,) program numbers; `diameter`: those of X are twice the way
@@ -232,7 +230,7 @@ def feed_number(value: float) -> str:
 class FrameMap:
     """One frame of a program for a given set of axes, with the maps both ways. Positions have shape (..., n_axes)."""
 
-    def __init__(self, frame: Frame, axes: tuple[str, ...], rotary: NDArray[np.bool_]) -> None:
+    def __init__(self, frame: Frame, axes: tuple[str, ...], rotary: Mask) -> None:
         self.frame = frame
         self.scale = np.where(rotary, np.pi / 180, frame.unit)
         if frame.diameter and "X" in axes:
@@ -244,18 +242,18 @@ class FrameMap:
         self.unit = frame.unit
         self.origin = np.array([frame.offset[axes.index(letter)] if letter in axes else 0.0 for letter in "XYZ"])
 
-    def program(self, command: FloatArray) -> FloatArray:
+    def program(self, command: Array) -> Array:
         """Program numbers of a command (..., n_axes), mm and rad: in units of the program, in its frame."""
         values = command - self.frame.offset
         if self.rotated:
             values[..., self.spatial] = _turned(values[..., self.spatial], self.rotation)
         return values / self.scale
 
-    def decimals(self, steps: FloatArray) -> NDArray[np.int64]:
+    def decimals(self, steps: Array) -> Ints:
         """(n_axes,) digits behind the point that numbers need for what the control can resolve, mm and rad."""
         return np.array([decimals_for(step) for step in steps / self.scale], dtype=np.int64)
 
-    def still(self, unmoved: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def still(self, unmoved: Mask) -> Mask:
         """Axes that stand exactly where they stood, free of the rounding of these maps.
 
         unmoved  (n_axes,) those that the program did not tell to move; in a rotated frame one of X Y Z moves them all
@@ -266,18 +264,18 @@ class FrameMap:
         result[self.spatial] = False
         return result
 
-    def command(self, program: FloatArray) -> FloatArray:
+    def command(self, program: Array) -> Array:
         """The inverse of `program`."""
         values = program * self.scale
         if self.rotated:
             values[..., self.spatial] = _turned(values[..., self.spatial], self.rotation.T)
         return values + self.frame.offset
 
-    def program_point(self, point: FloatArray) -> FloatArray:
+    def program_point(self, point: Array) -> Array:
         """A point X Y Z (mm, command coordinates) in program numbers; diameters do not apply to centres."""
         return np.asarray((point - self.origin) @ self.frame.rotation / self.unit)
 
-    def point_of(self, program: FloatArray) -> FloatArray:
+    def point_of(self, program: Array) -> Array:
         """X Y Z (3,) of a position (n_axes,) in the numbers in which centres are given: no diameters."""
         point = np.zeros(3)
         point[self.axes] = program[self.spatial]
@@ -285,17 +283,17 @@ class FrameMap:
             point[0] /= 2
         return point
 
-    def command_point(self, point: FloatArray) -> FloatArray:
+    def command_point(self, point: Array) -> Array:
         """The inverse of `program_point`, (..., 3)."""
         return np.asarray((point * self.unit) @ self.frame.rotation.T + self.origin)
 
 
-def _turned(points: FloatArray, rotation: FloatArray) -> FloatArray:
+def _turned(points: Array, rotation: Array) -> Array:
     """Points (..., k) times a rotation; what is not known (NaN) stays with the coordinates that are made of it."""
     lost = np.isnan(points)
     if not lost.any():
         return np.asarray(points @ rotation)
-    result: FloatArray = np.where(lost, 0.0, points) @ rotation
+    result: Array = np.where(lost, 0.0, points) @ rotation
     result[(lost.astype(float) @ (rotation != 0.0)) > 0] = np.nan
     return result
 
@@ -314,7 +312,7 @@ class RetractLevels:
         self.moves = moves
         self.pieces = pieces
         self.in_force: tuple[int, float] | None = None
-        self.approach: FloatArray | None = None
+        self.approach: Array | None = None
 
     def forget(self) -> None:
         """Something else than a corrected cycle: R is not known any more."""
@@ -327,7 +325,7 @@ class RetractLevels:
         number: int,
         frame: FrameMap,
         as_programmed: FrameMap,
-        here: FloatArray,
+        here: Array,
         address: str,
     ) -> Level | None:
         """What R shall be in the numbers of `frame` (its `number`), while the axes stand `here`; None of no cycle.
@@ -366,7 +364,7 @@ class RetractLevels:
             over[target.level.across] = rendered.level
             self.in_force, self.approach = (number, rendered.level), frame.command(over)
 
-    def returns(self, row: int) -> NDArray[np.bool_]:
+    def returns(self, row: int) -> Mask:
         """(n_axes,) axes that stand at that level where the motion behind a cycle begins."""
         if self.approach is None or self.moves.approach is None:
             return np.zeros(len(self.moves.axes), dtype=bool)

@@ -13,11 +13,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Index, Signs, finite, some, taken
 from ncfix.compensate.figures.curve import Curve, CurvePoints, Stretches, length
 from ncfix.compensate.figures.nearest import Nearest, Search
-from ncfix.compensate.plan.arrays import Array, Index, finite, some, taken
 from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.plan.kinematics import REST, Signs, carried, signs
+from ncfix.compensate.plan.kinematics import REST, carried, signs
 from ncfix.compensate.plan.sampling import BISECTIONS
 from ncfix.machine import State
 from ncfix.values import frozen

@@ -22,6 +22,7 @@ from functools import partial
 
 import numpy as np
 
+from ncfix.arrays import Array, Index, Signs, stacked, taken
 from ncfix.compensate.account import NoFigureReason, not_looked_at
 from ncfix.compensate.figures.backlash import BacklashBodies, Flank
 from ncfix.compensate.figures.curve import Curve, CurvePoints, Stretches
@@ -29,9 +30,8 @@ from ncfix.compensate.figures.nearest import Nearest, Search, over_holes, over_p
 from ncfix.compensate.figures.simulation import SimulatedErrors, actual_tip
 from ncfix.compensate.following import Task
 from ncfix.compensate.parts import MachineParts
-from ncfix.compensate.plan.arrays import Array, Index, stacked, taken
 from ncfix.compensate.plan.intent import Intent, left_in_cuts
-from ncfix.compensate.plan.kinematics import Signs, matters
+from ncfix.compensate.plan.kinematics import matters
 from ncfix.compensate.plan.written import rounding_of_arcs
 from ncfix.compensate.workers import Read
 from ncfix.control.moves import Moves

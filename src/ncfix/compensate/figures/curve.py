@@ -12,9 +12,9 @@ from typing import Any, cast
 
 import numpy as np
 
+from ncfix.arrays import Array, Index, Mask, every, finite, owners, picked, places, slices, some
 from ncfix.compensate.account import at_measured_places
 from ncfix.compensate.figures.simulation import BATCH
-from ncfix.compensate.plan.arrays import Array, Index, Mask, every, finite, owners, picked, places, slices, some
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.sampling import (
     DENSITY,

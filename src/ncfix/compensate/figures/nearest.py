@@ -21,8 +21,8 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix import core
+from ncfix.arrays import Array, Index, Mask, batches, owners, picked, places, ranges, stacked, taken
 from ncfix.compensate.figures.curve import Curve, CurvePoints, length
-from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, owners, picked, places, ranges, stacked, taken
 from ncfix.control.trace import NotInPartsError
 from ncfix.values import frozen, mutable
 

@@ -13,8 +13,8 @@ from dataclasses import field, replace
 
 import numpy as np
 
+from ncfix.arrays import Array, Index, Mask, owners, picked, stacked, taken
 from ncfix.compensate.account import Account
-from ncfix.compensate.plan.arrays import Array, Index, Mask, owners, picked, stacked, taken
 from ncfix.compensate.plan.deviation import errors_at, samples
 from ncfix.compensate.plan.figure_tally import PathSamples
 from ncfix.compensate.plan.sampling import even

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from ncfix.arrays import Array, Index, Mask, batches, distinct, owners, slices
 from ncfix.compensate import FixOptions
 from ncfix.compensate.following import Followed, Task, numbers_of, suspected
 from ncfix.compensate.parts import MachineParts
-from ncfix.compensate.plan.arrays import Array, Index, Mask, batches, distinct, owners, slices
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import commands_from_joints
 from ncfix.compensate.plan.sampling import DENSITY, MOST_SHOWN, bends, closely, even, merged, with_kinks

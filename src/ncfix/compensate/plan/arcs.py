@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask, picked, slices, stacked, vector_product
+from ncfix.arrays import Array, Index, Mask, picked, slices, stacked, vector_product
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.segments import ArcColumns, Segments, sweep_between
 from ncfix.values import frozen

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import (
+from ncfix.arrays import (
     Array,
     Index,
     Mask,

@@ -23,20 +23,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ncfix.arrays import Array, Index, Mask, chosen, distinct, every, finite, picked, put, slices, stacked
 from ncfix.compensate.plan import arcs
-from ncfix.compensate.plan.arrays import (
-    Array,
-    Index,
-    Mask,
-    chosen,
-    distinct,
-    every,
-    finite,
-    picked,
-    put,
-    slices,
-    stacked,
-)
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent, stays
 from ncfix.compensate.plan.kinematics import Correction, commands_from_joints, reached_joints, steer

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index
+from ncfix.arrays import Array, Index
 from ncfix.values import frozen
 
 

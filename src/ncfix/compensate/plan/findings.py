@@ -10,7 +10,7 @@ from dataclasses import field, replace
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask
+from ncfix.arrays import Array, Index, Mask
 from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.text.tree import Program

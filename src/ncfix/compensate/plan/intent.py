@@ -21,10 +21,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask, every, picked, put, some
+from ncfix.arrays import Array, Index, Mask, Signs, every, picked, put, some
 from ncfix.compensate.plan.kinematics import (
     REST,
-    Signs,
     carried,
     commands_from_joints,
     common,

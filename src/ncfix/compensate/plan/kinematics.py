@@ -15,17 +15,15 @@ taken to keep the side of its play that it last had.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask
+from ncfix.arrays import Array, Index, Mask, Signs
 from ncfix.compensate.plan.findings import pose_error
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import FLAT
 from ncfix.machine.steps import dot, volume
 from ncfix.values import frozen
-
-Signs = NDArray[np.int8]
 
 REST = 1e-9
 """mm or rad; an axis that moves less in a motion does not move."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask, distinct, finite, greatest, lengths, picked, some
+from ncfix.arrays import Array, Index, Mask, distinct, finite, greatest, lengths, picked, some
 from ncfix.compensate.plan.findings import Finding
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.segments import Segments, arcs_within, surely_within

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask, lengths, owners, picked, stacked, taken, vector_product
+from ncfix.arrays import Array, Index, Mask, lengths, owners, picked, stacked, taken, vector_product
 from ncfix.compensate.plan.intent import Intent, correctable
 from ncfix.compensate.plan.sampling import interior
 from ncfix.compensate.plan.segments import Segments

@@ -14,8 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.compensate.plan.arcs import Closure, fitted
-from ncfix.compensate.plan.arrays import (
+from ncfix.arrays import (
     Array,
     Index,
     Mask,
@@ -30,6 +29,7 @@ from ncfix.compensate.plan.arrays import (
     sums,
     vector_product,
 )
+from ncfix.compensate.plan.arcs import Closure, fitted
 from ncfix.compensate.plan.deviation import beside as left_beside
 from ncfix.compensate.plan.deviation import deviations, starts_to_check
 from ncfix.compensate.plan.ends import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask, offsets, owners, picked, places, vector_product
+from ncfix.arrays import Array, Index, Mask, offsets, owners, picked, places, vector_product
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.segments import Segments, accelerations
 from ncfix.machine import Machine

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask, every, lengths, owners, picked, spread, vector_product
+from ncfix.arrays import Array, Index, Mask, every, lengths, owners, picked, spread, vector_product
 from ncfix.compensate.plan.kinematics import linear_columns
 from ncfix.control.moves import MotionKind, Moves
 from ncfix.machine import Machine

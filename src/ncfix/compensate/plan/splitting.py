@@ -27,8 +27,7 @@ from typing import Protocol
 import numpy as np
 
 from ncfix import core
-from ncfix.compensate.plan.arcs import APART, NUDGE, Closure, across
-from ncfix.compensate.plan.arrays import (
+from ncfix.arrays import (
     Array,
     Index,
     Mask,
@@ -43,6 +42,7 @@ from ncfix.compensate.plan.arrays import (
     sums,
     vector_product,
 )
+from ncfix.compensate.plan.arcs import APART, NUDGE, Closure, across
 from ncfix.compensate.plan.ends import as_commands, path_of, with_rotary_held
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import regular

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask
+from ncfix.arrays import Array, Index, Mask
 from ncfix.compensate.plan.findings import pose_error
 from ncfix.compensate.plan.kinematics import (
     Correction,

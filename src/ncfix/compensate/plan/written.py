@@ -21,7 +21,7 @@ from itertools import product
 
 import numpy as np
 
-from ncfix.compensate.plan.arrays import Array, Index, Mask, finite, greatest, lengths, picked, put, some
+from ncfix.arrays import Array, Index, Mask, finite, greatest, lengths, picked, put, some
 from ncfix.compensate.plan.intent import Intent, lacking
 from ncfix.compensate.plan.sampling import reach
 from ncfix.compensate.plan.segments import Segments, sweep_between

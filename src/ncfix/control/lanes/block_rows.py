@@ -13,15 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import core
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.control.control import ProgramControl
 from ncfix.control.coordinates import N_LETTERS
 from ncfix.control.moves import FeedMode
 from ncfix.text.tree import Program
 from ncfix.values import frozen, mutable
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 Shapes = NDArray[np.int32]
 Before = tuple[float, float, float]
 """What the number of an F word counts; feed and motion code in force before."""
@@ -69,14 +67,14 @@ class LaneTables:
     turns   (s,) arcs
     """
 
-    axes: NDArray[np.int64]
-    feed: NDArray[np.int64]
-    motion: NDArray[np.int64]
-    mask: NDArray[np.int64]
-    centre: NDArray[np.int64]
-    radius: NDArray[np.int64]
-    fixed: NDArray[np.bool_]
-    turns: NDArray[np.bool_]
+    axes: Ints
+    feed: Ints
+    motion: Ints
+    mask: Ints
+    centre: Ints
+    radius: Ints
+    fixed: Mask
+    turns: Mask
 
     @classmethod
     def of(cls, lanes: Sequence[Lane | None]) -> LaneTables:
@@ -120,12 +118,12 @@ class BlockRows:
     turns   (n,) arcs; None: no block can be one
     """
 
-    path: FloatArray
-    feed: FloatArray
+    path: Array
+    feed: Array
     fed: Mask
-    motion: FloatArray
+    motion: Array
     coded: Mask
-    mask: IntArray
+    mask: Ints
     turns: Mask | None = None
 
     def rows(self, start: int, stop: int) -> BlockRows:
@@ -158,7 +156,7 @@ def feed_unit(control: ProgramControl) -> float:
     return 1.0 if control.modal.feed_mode == FeedMode.INVERSE_TIME else control.modal.unit
 
 
-def words(numbers: FloatArray, first: IntArray, slots: IntArray) -> FloatArray:
+def words(numbers: Array, first: Ints, slots: Ints) -> Array:
     """The numbers at some slots of blocks, NaN where the slot is -1."""
     given = slots >= 0
     if given.all():
@@ -169,7 +167,7 @@ def words(numbers: FloatArray, first: IntArray, slots: IntArray) -> FloatArray:
 
 
 def followed(
-    control: ProgramControl, numbers: FloatArray, first: IntArray, shapes: Shapes, tables: LaneTables, before: Before
+    control: ProgramControl, numbers: Array, first: Ints, shapes: Shapes, tables: LaneTables, before: Before
 ) -> BlockRows:
     """What blocks of some shapes with numbers from `first` on say, and where they lead."""
     position, offset, scale = (np.array(each) for each in (control.position, control.offset, control.scale))
@@ -205,7 +203,7 @@ def followed(
     return stage
 
 
-def filled(values: FloatArray, valid: NDArray[np.bool_], before: float) -> FloatArray:
+def filled(values: Array, valid: Mask, before: float) -> Array:
     """Every row's value, or the last one given above it; `before` where none is."""
     if valid.all():
         return values

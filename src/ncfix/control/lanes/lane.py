@@ -16,23 +16,13 @@ from typing import Protocol
 import numpy as np
 
 from ncfix import core
+from ncfix.arrays import Array, Ints, Mask
 from ncfix.control.arcs import CLOCKWISE, COUNTER, FUZZ, ZERO_RADIUS, centre_from_radius, check_closure
 from ncfix.control.builder import Circles, MotionColumns
 from ncfix.control.control import ProgramControl
 from ncfix.control.coordinates import IDENTITY, X, mask_of
 from ncfix.control.expressions import Fault
-from ncfix.control.lanes.block_rows import (
-    BlockRows,
-    FloatArray,
-    IntArray,
-    Lane,
-    LaneTables,
-    Lookahead,
-    Mask,
-    ProgramText,
-    rows_before,
-    words,
-)
+from ncfix.control.lanes.block_rows import BlockRows, Lane, LaneTables, Lookahead, ProgramText, rows_before, words
 from ncfix.control.moves import FeedMode, MotionKind
 
 SHORTEST = 16
@@ -103,7 +93,7 @@ def is_open(control: ProgramControl, unit: LaneText, block: int) -> bool:
     return begun and known and (modal.incremental or control.offset_checked)
 
 
-def before_placing(control: ProgramControl, mask: IntArray, block: int) -> int:
+def before_placing(control: ProgramControl, mask: Ints, block: int) -> int:
     """The block that first brings an unplaced axis to its place, or the end of blocks with these axis words (n,).
 
     That block goes by itself, so that all of a stretch have the same axes unplaced.
@@ -175,7 +165,7 @@ def note_codes(control: ProgramControl, stage: BlockRows) -> None:
         modal.feed_given = modal.feed != 0.0
 
 
-def styles(control: ProgramControl, stage: BlockRows) -> IntArray:
+def styles(control: ProgramControl, stage: BlockRows) -> Ints:
     """The styles of motions whose start and end are known, (n,)."""
     found = np.full(len(stage.motion), control.style_of(MotionKind.FEED, 10))
     rapid = stage.motion == 0
@@ -221,7 +211,7 @@ def turned(control: ProgramControl, unit: ProgramText, block: int, stage: BlockR
     return Circles(rows, middle, IDENTITY[plane.across], control.handedness * sweep, fixed), count
 
 
-def closes(control: ProgramControl, step: FloatArray, centre: FloatArray) -> Mask:
+def closes(control: ProgramControl, step: Array, centre: Array) -> Mask:
     """(k,) arcs that surely close, from their start to `step` about `centre`; of the others `on_circle` says it."""
     start, end = np.hypot(*centre.T), np.hypot(*(step - centre).T)
     return (np.minimum(start, end) > 2 * ZERO_RADIUS) & (np.abs(start - end) < control.closure_mm / 2)
@@ -239,7 +229,7 @@ def on_circle(
     return point
 
 
-def fitting(control: ProgramControl, unit: ProgramText, block: int, stage: BlockRows, rows: IntArray) -> int:
+def fitting(control: ProgramControl, unit: ProgramText, block: int, stage: BlockRows, rows: Ints) -> int:
     """How many blocks run before an arc without the words that it needs, or a straight motion with those of one.
 
     rows  (k,) the blocks that have such words, or that G2 or G3 is in force at
@@ -264,7 +254,7 @@ def named(control: ProgramControl, lanes: LaneTables) -> Mask:
     return able & ~lanes.fixed[:, X] if control.modal.diameter else able
 
 
-def is_flat(control: ProgramControl, unit: ProgramText, blocks: IntArray) -> Mask:
+def is_flat(control: ProgramControl, unit: ProgramText, blocks: Ints) -> Mask:
     """(k,) blocks without a centre word across the plane in force, or with one that says nothing: no spirals."""
     program, plane = unit.program, control.modal.plane
     if plane.across > 2:
@@ -274,9 +264,7 @@ def is_flat(control: ProgramControl, unit: ProgramText, blocks: IntArray) -> Mas
     return np.isnan(across) | ((across == 0.0) & control.takes_zero_across)
 
 
-def centre_words(
-    control: ProgramControl, unit: ProgramText, blocks: IntArray, begin: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def centre_words(control: ProgramControl, unit: ProgramText, blocks: Ints, begin: Array) -> tuple[Array, Array]:
     """What the centre words of blocks say, (k, 2) relative to their starts `begin`, and R, (k,) NaN without; in mm."""
     program, lanes, plane = unit.program, unit.lanes, control.modal.plane
     shapes, first, mm = program.template[blocks], program.first_number[blocks], control.unit_of(X)

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
 from ncfix.machine.piecewise import Spline
-from ncfix.measure.measurement import Array
 from ncfix.values import frozen
 
 LETTERS = "XYZ"

@@ -13,11 +13,12 @@ from itertools import combinations
 
 import numpy as np
 
+from ncfix.arrays import Array, Ints
 from ncfix.diagnosis.catalogue.candidate import LETTERS, Candidate, MeasuredRange, along, zero
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axes import Axis
 from ncfix.machine.basis import Polynomial
-from ncfix.measure.measurement import CENTRE, Array, Index, Measurement
+from ncfix.measure.measurement import CENTRE, Measurement
 
 # -- columns of how the axes moved -----------------------------------------------------------------------------------
 
@@ -67,7 +68,7 @@ def _columns(name: str, names: Sequence[str]) -> Iterator[str]:
     )
 
 
-def _of_path(found: dict[str, Array], names: list[str], places: Array, feed: Array, rows: Index) -> None:
+def _of_path(found: dict[str, Array], names: list[str], places: Array, feed: Array, rows: Ints) -> None:
     """Fill in the columns of one set."""
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     way = np.concatenate([[0.0], np.cumsum(steps)])

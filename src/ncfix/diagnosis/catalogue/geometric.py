@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnosis.catalogue.candidate import (
     LETTERS,
     LOST,
@@ -33,7 +34,6 @@ from ncfix.diagnosis.catalogue.candidate import (
 from ncfix.machine import Effect
 from ncfix.machine.axes import Axis, component_title, is_arm
 from ncfix.machine.basis import Backlash, Fourier, Periodic, Polynomial
-from ncfix.measure.measurement import Array
 
 PIVOT = 10.0
 """mm: how far the point about which a slide tilts lies from the reference point stated, in each direction."""

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnosis.catalogue.candidate import (
     LETTERS,
     TURNS,
@@ -32,7 +33,6 @@ from ncfix.machine import Axis, Effect
 from ncfix.machine.axes import SPINDLE
 from ncfix.machine.basis import Polynomial
 from ncfix.machine.piecewise import PiecewiseConstant
-from ncfix.measure.measurement import Array
 from ncfix.values import frozen
 
 LAGS = (None, 600.0, 1800.0, 5400.0)

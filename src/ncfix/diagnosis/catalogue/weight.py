@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnosis.catalogue.candidate import (
     LETTERS,
     TURNS,
@@ -27,7 +28,6 @@ from ncfix.machine import Effect
 from ncfix.machine.axes import SPINDLE, Axis, is_arm
 from ncfix.machine.basis import Fourier, Polynomial
 from ncfix.machine.effects import leaning, yielding
-from ncfix.measure.measurement import Array
 
 POWERS = (0, 1, 2, 3, 4)
 FOOT = 30.0

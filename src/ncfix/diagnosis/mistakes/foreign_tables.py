@@ -16,12 +16,13 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
+from ncfix.arrays import Array
 from ncfix.diagnosis.evidence import FURTHER, marginal
 from ncfix.diagnosis.residual_data import Misfit, is_free, misfit
 from ncfix.machine import Effect, Machine
 from ncfix.machine.piecewise import PiecewiseLinear
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.measurement import Measurement
 from ncfix.measure.selection import Selection
 from ncfix.values import frozen
 

@@ -12,6 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ncfix.arrays import Array, Ints
 from ncfix.diagnosis.mistakes.foreign_tables import without_foreign_tables
 from ncfix.diagnosis.mistakes.mistake import Mistake, times, undone_by_columns
 from ncfix.diagnosis.mistakes.stale_tables import shifted_tables
@@ -29,7 +30,7 @@ from ncfix.machine.axes import Axis
 from ncfix.machine.plausible import much, times_a_machining_centre
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array, Index, Measurement
+from ncfix.measure.measurement import Measurement
 from ncfix.values import frozen
 
 DOUBTED, OFF = 0.3, 3.0
@@ -227,7 +228,7 @@ class FirstOrder:
         return seen.um * seen.residual(seen.selection.start, seen.start)
 
     @property
-    def rows(self) -> Index:
+    def rows(self) -> Ints:
         """(m,) the row of each value among those of all files; the first for what has none."""
         return np.maximum(rows_of(self.now.problem), 0)
 

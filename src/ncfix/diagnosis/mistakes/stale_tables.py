@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ncfix.arrays import Array
 from ncfix.diagnosis.residual_data import ResidualData, residual_data
 from ncfix.machine import Effect, Machine
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.measurement import Measurement
 
 SHIFT_REACH = 0.16
 """Of the travel measured: how far a table may be off."""

@@ -7,8 +7,8 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ncfix.arrays import Mask
 from ncfix.diagnosis.checks import sensible
 from ncfix.diagnosis.mistakes.mistake import Mistake, times
 from ncfix.diagnosis.residual_data import misfit
@@ -112,7 +112,7 @@ def units_of_values(measurements: tuple[Measurement, ...], machine: Machine) -> 
         yield Mistake(UNIT_OF_VALUES, title, "", machine, changed, stretch=float(stretch), remedy=remedy)
 
 
-def _turns(measurement: Measurement) -> dict[str, NDArray[np.bool_]]:
+def _turns(measurement: Measurement) -> dict[str, Mask]:
     """The measured columns that have a unit, and where in each an angle was measured."""
     found = {name: np.zeros(len(measurement), dtype=bool) for name in (*LENGTHS, *READINGS)}
     found |= {name: np.ones(len(measurement), dtype=bool) for name in TURNS}

@@ -17,13 +17,12 @@ from itertools import combinations, product
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
+from ncfix.arrays import Array, Mask
 from ncfix.machine.symbolic.algebra import Algebra, Poly
 from ncfix.machine.symbolic.derivation import POSITION, Derivation
 from ncfix.values import frozen
 
-Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-9
 """Relative size below which a residual is rounding: entries are of order one and exact to 1e-15."""
 
@@ -177,9 +176,7 @@ def identifiable(
     return Identifiable(tuple(v.name for v in unknowns), tuple(combinations.values()), invisible)
 
 
-def _split(
-    algebra: Algebra, column: Mapping[str, sp.Expr], moving: NDArray[np.bool_], absolute: bool
-) -> dict[Hashable, Poly]:
+def _split(algebra: Algebra, column: Mapping[str, sp.Expr], moving: Mask, absolute: bool) -> dict[Hashable, Poly]:
     """Polynomials in what is fixed, by component and monomial of what is varied."""
     found: dict[Hashable, Poly] = {}
     for component, expression in column.items():

@@ -1,4 +1,4 @@
-"""Rows of narrow tables, and lists of different lengths in flat arrays.
+"""The types of arrays, one name for each kind of number; rows of narrow tables, and lists of different lengths.
 
 numpy takes a step of its own for each row of a narrow table. What is done to rows here goes by columns instead: as fast
 as for one long column. Lists of different lengths are flat: members of one list next to each other, `counts` (n,) of
@@ -17,8 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+"""Numbers: mm, rad, or what is said where it is used."""
 Mask = NDArray[np.bool_]
+"""Which of some things."""
 Index = NDArray[np.intp]
+"""Places in other arrays, or how many of something."""
+Ints = NDArray[np.int64]
+"""Whole numbers: places in a text, codes, blocks."""
+Signs = NDArray[np.int8]
+"""Directions: -1, 0 or 1."""
+Bytes = NDArray[np.uint8]
+"""A text."""
 Table = TypeVar("Table")
 """A dataclass whose fields are columns of one length: arrays, or such dataclasses again."""
 
@@ -156,7 +165,7 @@ def sums(values: Array, counts: Index) -> Array:
     return total
 
 
-def batches(sizes: Index, most: int) -> list[NDArray[np.intp]]:
+def batches(sizes: Index, most: int) -> list[Index]:
     """The lists in runs of at most about `most` members together, at least one list each."""
     if not len(sizes):
         return []
