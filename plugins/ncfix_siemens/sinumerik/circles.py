@@ -25,14 +25,15 @@ def tangential(control: Sinumerik, words: BlockWordValues) -> None:
     """CT with its end; TURN adds full turns. One that is refused keeps what it begins from, and so its direction."""
     control.use_all_start_positions()
     end, heading, plane = destination(control, words), control.heading, control.modal.plane
-    why = TURNS_AT_RUNTIME if words.unknown("TURN") else doubtful_polar(control, words)
+    why = TURNS_AT_RUNTIME if words.unknown("TURN") else ""
+    if {"AP", "RP"} & words.values.keys():
+        why = POLAR_ARC
     step = control.way_to(end.target)
     ahead = (0.0, 0.0) if heading is None else plane.of(heading)
     chord = plane.of(step)
-    why = why or ("" if math.hypot(*ahead) else NO_HEADING)
-    if why or end.unknown or control.unknown:
+    if why or end.unknown or control.unknown or not math.hypot(*ahead):
         circle = circle_of(control, plane, (1.0, 0.0), 0.0)._replace(fixed=True)
-        control.go(MotionKind.ARC, words, end, CT_LEFT, refusal=why, arc=circle)
+        control.go(MotionKind.ARC, words, end, CT_LEFT, refusal=why or NO_HEADING, arc=circle)
         return
     along = ahead[0] * chord[0] + ahead[1] * chord[1]
     left = ahead[0] * chord[1] - ahead[1] * chord[0]
@@ -50,6 +51,8 @@ def tangential(control: Sinumerik, words: BlockWordValues) -> None:
 
 CENTRE_AT_RUNTIME = "the centre of the arc is known only at run time"
 VIA_AT_RUNTIME = "the intermediate point of the arc is known only at run time"
+POLAR_ARC = "an arc (CT) in polar coordinates"
+"""Its end is said in Cartesian coordinates (SINUMERIK ONE, NC Programming, 12/2019: CT)."""
 POLAR_AND_CENTRE = "an arc about the pole (AP, RP) that has a centre or radius, too"
 DIAMETERS = "an absolute centre or intermediate point of an arc while X is a diameter ({})"
 VIA = ("I1", "J1", "K1")

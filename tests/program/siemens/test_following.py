@@ -432,14 +432,6 @@ def test_statements_that_change_coordinates_or_tools_in_ways_that_are_not_follow
     assert set(found.rule.tolist()) == {Rule.REFUSE}
 
 
-def test_a_tangential_arc_may_end_at_a_polar_place() -> None:
-    ends = "AP=90 RP=30", "X10 Y35"
-    polar, plain = (follow(f"G111 X10 Y5\nG0 X0 Y0 Z5\nG1 X40 Y2 F500\nCT {end}\nG1 X5\n").moves for end in ends)
-    assert polar.rule[-2] == Rule.CORRECT
-    assert np.allclose(polar.end, plain.end)
-    assert np.allclose(polar.centre[-2], plain.centre[-2])
-
-
 @pytest.mark.parametrize("names", ["G1 CSPLINE", "G0 POLY", "G33 G1", "CT G2", "BSPLINE CIP"])
 def test_two_motions_in_one_block_exclude_one_another(names: str) -> None:
     with pytest.raises(SourceError, match="exclude one another"):
