@@ -112,13 +112,16 @@ class MacroInterpreter(RS274Interpreter):
     def execute(self, plan: RS274Plan, unit: RS274Unit, block: int) -> bool:
         """Execute a block; True if the program ends there. A flat program has no conditions left to say it with."""
         flow = plan.flow
-        if flow is not None and flow.keyword == "if then" and not self.watcher and self.may_be_set(plan, flow):
+        if flow is not None and flow.keyword == "if then" and not self.watcher and self.set_in_doubt(plan, flow):
             return False
         return super().execute(plan, unit, block)
 
-    def may_be_set(self, plan: RS274Plan, flow: FlowLine) -> bool:
-        """Whether variables are set, and nothing else is done, on a condition that is known at run time only: then they
-        are, too. Alarms and messages that depend on it do no harm: where the program goes on, none was raised."""
+    def set_in_doubt(self, plan: RS274Plan, flow: FlowLine) -> bool:
+        """Take a block that only sets variables on a condition known at run time: they are not known from then on.
+
+        False: it is another block. Alarms and messages that depend on the condition do no harm: where the program goes
+        on, none was raised.
+        """
         alone = plan.assignments and not (plan.letters or plan.template.g_codes or plan.template.m_codes)
         if not alone or not isinstance(flow.arguments[0](self.control), Unknown):
             return False

@@ -165,7 +165,7 @@ class RS274Control(shared.ProgramControl):
         return nominal(value)
 
     def read_position(self, name: str, index: int) -> Value:
-        """Note that the program reads a position by this name: when it is corrected, it finds another value there."""
+        """A position, which the program reads by this name; once it is corrected it finds another value there."""
         self.position_is_read(name)
         return Unknown(name, nominal(self.coordinate(index)))
 

@@ -205,7 +205,7 @@ class Prover(Deviations):
             rows, _, last = pairing.pairs.columns.T
             row = int(rows[self.second.numbers[last] < fault.line].max(initial=0))
         near = range(max(row - 2, 0), min(row + 3, len(self.first.lines)))
-        return (row + 1) * any(self._is_foreign(at) or (at in self.ours and bool(self.ours[at].why)) for at in near)
+        return row + 1 if any(self._is_foreign(at) or (at in self.ours and self.ours[at].why) for at in near) else 0
 
     def _is_foreign(self, row: int) -> bool:
         step = self.ours.get(row)

@@ -84,8 +84,8 @@ class Axis:
         """Internal units per unit of the machine file: rad per degree, or 1."""
         return DEGREE if self.rotary else 1.0
 
-    def reach(self, component: str) -> float:
-        """How far a component, X ... C, is along or about the axis: the cosine from `direction` to its error axis."""
+    def along(self, component: str) -> float:
+        """The cosine between the axis and the error axis of a component, X ... C: 1 along or about it, 0 across."""
         return float(np.asarray(self.error_axes[COMPONENTS.index(component) % 3]) @ np.asarray(self.direction))
 
     def owns(self, component: str) -> bool:
@@ -93,7 +93,7 @@ class Axis:
 
         The error axes say so, not the letter: of a W along Z it is Z. Of an axis that is askew to all it is its letter.
         """
-        near = abs(self.reach(component))
+        near = abs(self.along(component))
         return (component in LINEAR) != self.rotary and (
             near > 1 - SKEWED or (component == self.name and near > SKEWED)
         )
@@ -316,7 +316,7 @@ def component_title(name: str, axis: Axis | None = None) -> str:
     axis = axis or _by_letter(joint)
     if zero:
         return _location_title(component, axis)
-    near = abs(axis.reach(component))
+    near = abs(axis.along(component))
     if axis.owns(component):
         return f"{'angular ' if axis.rotary else ''}positioning of {joint}"
     if about:
@@ -343,7 +343,7 @@ def _parts(name: str) -> tuple[str, str, str]:
 
 
 def _location_title(component: str, axis: Axis) -> str:
-    joint, about, own = axis.name, TURNS_ABOUT.get(component), abs(axis.reach(component)) > 1 - SKEWED
+    joint, about, own = axis.name, TURNS_ABOUT.get(component), abs(axis.along(component)) > 1 - SKEWED
     if axis.owns(component) and (own or not axis.rotary):
         return f"zero offset of {joint}"
     if about:
@@ -395,7 +395,7 @@ def usual_basis(name: str, axis: Axis | None = None) -> str:
     component, _, joint = match.groups()
     axis = axis or _by_letter(joint)
     if axis.rotary:
-        return f"fourier order {1 if abs(axis.reach(component)) > 1 - SKEWED else 2} up"
+        return f"fourier order {1 if abs(axis.along(component)) > 1 - SKEWED else 2} up"
     return f"polynomial degree {2 if component in LINEAR and not axis.owns(component) else 1} up"
 
 

@@ -106,7 +106,7 @@ def of_bodies(measurement: Measurement, machine: Machine) -> Measurement:
     """
     factor = np.ones(len(measurement))
     for axis, component, rows in _positioned(measurement, machine):
-        along = axis.reach(component)
+        along = axis.along(component)
         if abs(along) < 1 - SLANTED:
             text = f"{axis.name} does not move along its error axis: what it is off is no E{component}{axis.name} alone"
             raise ConfigError.of("NCF618", text, Place(measurement.path), "give the errors as kind axis")
@@ -117,7 +117,7 @@ def of_bodies(measurement: Measurement, machine: Machine) -> Measurement:
 def backwards(measurement: Measurement, machine: Machine, code: str, hint: str) -> Iterator[Message]:
     """A word on positioning of axes whose bodies go against their numbers: nobody says how a table counts."""
     for axis, component, rows in _positioned(measurement, machine):
-        if axis.reach(component) < 0:
+        if axis.along(component) < 0:
             own = f"E{component}{axis.name}"
             text = f"{own} is taken along the base axis, against which {axis.name} moves as its number grows"
             yield Message(code, text, measurement.place(rows[0]), hint)

@@ -328,7 +328,7 @@ def search(volume: Volume, target: float, most: Sequence[int], points: int, equa
 
 
 def _along(volume: Volume, axis: int, target: float, most: int) -> tuple[Index, Array]:
-    """Index along one input, and what each misses there."""
+    """Numbers of nodes along one input, and what each misses there."""
     counts, missed = [], []
     for count in volume.counts(axis, most):
         counts.append(count)

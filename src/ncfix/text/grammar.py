@@ -134,6 +134,7 @@ def parse(dialect: Dialect, code: str) -> Tree[Token]:
 def _place(error: UnexpectedInput, length: int) -> int:
     from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
-    at_end = isinstance(error, UnexpectedToken) and error.token.type == "$END"
-    known = isinstance(error, UnexpectedCharacters | UnexpectedToken) and error.pos_in_stream is not None
-    return int(error.pos_in_stream or 0) if known and not at_end else length
+    if isinstance(error, UnexpectedToken) and error.token.type == "$END":
+        return length
+    known = isinstance(error, UnexpectedCharacters | UnexpectedToken)
+    return length if not known or error.pos_in_stream is None else int(error.pos_in_stream)

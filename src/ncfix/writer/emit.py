@@ -123,7 +123,7 @@ class _Emitter:
         self.kind, self.rotary = view(moves.kind), tuple(moves.rotary.tolist())
         plain = np.isin(moves.kind, (MotionKind.RAPID, MotionKind.FEED, MotionKind.ARC)) & (moves.rule != Rule.PASS)
         self.forgets, self.relies = (view(mask) for mask in (moves.kind != MotionKind.DWELL, plain))
-        self.wordless, self.increments = moves.idle, moves.increments
+        self.idle, self.increments = moves.idle, moves.increments
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
         self.spatial = (x, y, z)
         self.layouts: dict[int, BlockLayout | None] = {}
@@ -319,7 +319,7 @@ class _Emitter:
         nominal = as_programmed.program(moves.end[row].copy())
         arc, modal, kind = bool(pieces.arc[rows.start]), int(moves.modal[row]), self.kind[row]
         straight = modal if modal in (0, 10) or kind == MotionKind.CYCLE else 10
-        fractions, ends, wordless = pieces.fraction[rows], frame.program(pieces.end[rows].copy()), self.wordless[row]
+        fractions, ends, wordless = pieces.fraction[rows], frame.program(pieces.end[rows].copy()), self.idle[row]
         if wordless.any():
             ends[:, wordless] = start[wordless]
         call = moves.call_of(row)
