@@ -11,7 +11,6 @@ from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import field
 from functools import lru_cache
-from operator import itemgetter
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -189,51 +188,13 @@ class ProgramReading:
     def part(self, first: int, stop: int) -> PartColumns:
         """Read the blocks from `first` up to `stop`."""
         found = self.scan(first, stop)
-        known = list(map(self.index.get, found.shapes))
-        if None in known and self.learned(first, found, known):
-            known = list(map(self.index.get, found.shapes))
-        if None not in known:
-            shapes = np.array(known, dtype=np.int32)
-            self.take(shapes if found.group is None else shapes[found.group])
-            return PartColumns(found.first_number, moved_by(found.spans, self.blocks[first, 0]), found.values)
+        known = np.array([self.index.get(shape, -1) for shape in found.shapes], dtype=np.int32)
+        self.take(known if found.group is None else known[found.group])
         exact: dict[int, Parsed] = {}
-        if found.group is not None:
-            known = [known[group] for group in found.group.tolist()]
-        found = found.expanded()
-        lacking = [row for row, template in enumerate(known) if template is None]
-        self.take(np.array([-1 if template is None else template for template in known], dtype=np.int32))
-        for row in lacking:
-            template = self.index.get(found.shapes[row])
-            self.rows[first + row] = self.learn(first, row, found, exact) if template is None else template
+        for row in np.flatnonzero(self.rows[first:stop] < 0).tolist():
+            self.rows[first + row] = self.learn(first, row, found, exact)
         columns = with_exact(found, exact, self.blocks[first:stop, 0] - self.blocks[first, 0])
-        return columns._replace(spans=columns.spans + self.blocks[first, 0])
-
-    def learned(self, first: int, scan: Scan, known: list[int | None]) -> bool:
-        """Learn the shapes that are not known yet from the first block of each; whether that will do."""
-        first_rows = np.arange(len(known))
-        if scan.group is not None:
-            first_rows[scan.group[::-1]] = np.arange(len(scan.group))[::-1]
-        rows = first_rows.tolist()
-        new = {scan.shapes[number]: rows[number] for number in range(len(known) - 1, -1, -1) if known[number] is None}
-        return None not in new and all(
-            self.understood(first, row, scan, shape) is not None
-            for shape, row in sorted(new.items(), key=itemgetter(1))
-        )
-
-    def understood(self, first: int, row: int, scan: Scan, shape: bytes | None) -> int | None:
-        """The template of a new shape; None where its block cannot be read, or has to be taken as it is."""
-        assert shape is not None
-        template = shapes_of(self.dialect).recall(shape)
-        if template is None:
-            try:
-                parsed = parse_block(self.dialect, self.source[slice(*self.blocks[first + row])].decode("latin-1"))
-            except BlockError:
-                return None
-            if not agrees(scan, row, parsed, self.blocks[first + row, 0] - self.blocks[first, 0]):
-                return None
-            template = parsed.template
-            shapes_of(self.dialect).keep(shape, template)
-        return self.number(shape, template)
+        return columns._replace(spans=moved_by(columns.spans, self.blocks[first, 0]))
 
     def tail(self) -> PartColumns:
         """The blocks after the end of the tape."""
@@ -260,11 +221,14 @@ class ProgramReading:
         return found.setting_apart(np.flatnonzero(lengths > limit).tolist()) if limit else found
 
     def learn(self, first: int, row: int, scan: Scan, exact: dict[int, Parsed]) -> int:
-        """The template of a block that is the first of its shape here, or that has to be taken as it is."""
-        shape = scan.shapes[row]
-        known = shapes_of(self.dialect).recall(shape) if shape is not None else None
-        if shape is not None and known is not None:
-            return self.number(shape, known)
+        """The template of a block whose shape was not known, or that has to be taken as it is: in `exact` then."""
+        shape = scan.shapes[row if scan.group is None else scan.group[row]]
+        if shape is not None:
+            if shape in self.index:  # from a block further up in this part
+                return self.index[shape]
+            known = shapes_of(self.dialect).recall(shape)
+            if known is not None:
+                return self.number(shape, known)
         start, stop = self.blocks[first + row]
         text = self.source[start:stop]
         parsed = self.parsed(first + row, text)
@@ -274,6 +238,7 @@ class ProgramReading:
         if shape is not None and agrees(scan, row, parsed, start - self.blocks[first, 0]):
             shapes_of(self.dialect).keep(shape, parsed.template)
             return self.number(shape, parsed.template)
+        texts_of(self.dialect).keep(text, parsed)
         exact[row] = parsed
         return self.number(text + b"\n", parsed.template)
 
@@ -293,14 +258,12 @@ class ProgramReading:
             if limit and len(text) > limit:
                 long = f"the line has {len(text)} characters; {self.dialect.title} takes {limit}"
                 raise BlockError("NCF105", long, limit, "break the line or shorten its comment")
-            parsed = parse_block(self.dialect, text.decode("latin-1"))
+            return parse_block(self.dialect, text.decode("latin-1"))
         except BlockError as fault:
             if self.language.lenient and self.in_doubt(block):
                 return NOT_READ
             place = Place(self.path, block + self.first_line, fault.place + 1, text.decode("latin-1"))
             raise SourceError.of(fault.code, fault.text, place, fault.hint) from None
-        texts_of(self.dialect).keep(text, parsed)
-        return parsed
 
     def in_doubt(self, block: int) -> bool:
         """Whether the control may never get to a block."""
