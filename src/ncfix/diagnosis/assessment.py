@@ -1,13 +1,11 @@
-"""Are the fitted constants such as machines have? The bounds of every row of the catalogue, and the signs that mean
-something.
+"""Plausibility of the size and sign of a finding, and the targets that can correct it.
 
-The bounds are wide: what a machine that still cuts parts may have, not what it should have. Beyond them a name is not
-taken back, but it is said: a collision, a wrong unit, or another effect that this one only imitates.
+The bounds of size are wide: a machine that still cuts parts may reach them. A finding beyond them is kept, with a
+remark: a collision, a wrong unit, or another effect that this one only imitates.
 
-Which target can carry an effect: the rewriting of programs (`fix`), and the controls' own tables (`export`).
-
-By what the effect depends on; how well a table of a given machine does it, `ncfix export` measures. The classes are
-those of ISO/TR 16907 as docs/controllers.md lists them.
+The targets are the rewriting of programs (`fix`) and the controls' own tables (`export`). They follow from the inputs
+of the effect and the classes of ISO/TR 16907 (docs/controllers.md); how well the tables of a given machine do it,
+`ncfix export` measures.
 """
 
 from __future__ import annotations
@@ -57,31 +55,32 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "rotary centre drift": (150.0, 0.0),
     "slip": (1000.0, 0.0),
 }
-"""kind -> (um, urad) that the error of the joint reaches at most where it was measured, on a machine of a metre."""
+"""Kind of effect -> largest plausible error motion of the joint over the measured range, (um, urad), for a machine of
+one metre. Zero: no bound."""
 FIX = "fix"
 POSITIONING = ("linuxcnc", "fanuc-pitch", "heidenhain", "siemens", "isg", "fanuc", "heidenhain-kinematics")
-"""Tables of one axis over itself."""
+"""Exports that hold the positioning of an axis over its own position."""
 ALONG = ("linuxcnc", "heidenhain", "siemens", "isg", "heidenhain-kinematics")
-"""Those that hold play of a linear axis that changes along it; both Heidenhain controls with `backlash=on`."""
+"""Exports that hold backlash of a linear axis that varies along it; both Heidenhain ones with `backlash=on`."""
 REVERSAL = (*ALONG, "fanuc", "fanuc-rotary")
-"""Those that hold play of a linear axis that is the same everywhere."""
+"""Exports that hold backlash of a linear axis that is the same everywhere."""
 TURNED = ("linuxcnc", "heidenhain", "siemens", "heidenhain-kinematics")
-"""Those that hold play of a rotary axis about itself."""
+"""Exports that hold backlash of a rotary axis about itself."""
 VOLUME = ("fanuc", "fanuc-rotary", "isg", "siemens", "heidenhain-kinematics")
-"""Those of all linear axes."""
+"""Exports that hold errors over the positions of all linear axes."""
 ACROSS = ("heidenhain", *VOLUME)
-"""Those of one axis over another, too."""
+"""Exports that hold a shift over the position of another axis."""
 TURNING = ("fanuc-rotary", "isg", "siemens", "heidenhain-kinematics")
-"""Those over rotary axes."""
+"""Exports that hold errors over the positions of rotary axes."""
 
 
 @frozen(slots=False)
 class Plausibility:
-    """What the fitted constants amount to.
+    """Plausibility of the fitted coefficients of a finding.
 
-    largest  the error of the joint, largest where it was measured: um, and urad
-    bounds   the same, of the catalogue's row; None for a row of a plugin
-    remarks  what is odd about size or sign, in words
+    largest  largest error motion of the joint over the measured range: (um, urad)
+    bounds   plausible limits of `largest` by the catalogue; None for an effect of a plugin
+    remarks  messages on an implausible size or sign
     """
 
     largest: tuple[float, float]
@@ -90,12 +89,12 @@ class Plausibility:
 
     @property
     def plausible(self) -> bool:
-        """Whether nothing is odd."""
+        """Whether there are no remarks."""
         return not self.remarks
 
 
 def catalogue_row(candidate: Candidate) -> str:
-    """The row of the catalogue, without the axis."""
+    """The key of a candidate in `BOUNDS`: its kind, without the axis."""
     name = candidate.name
     if len(name) == 3 and name.startswith("E"):
         return "curve"
@@ -105,7 +104,7 @@ def catalogue_row(candidate: Candidate) -> str:
 
 
 def plausibility(data: ResidualData, candidate: Candidate, effects: Sequence[Effect]) -> Plausibility | None:
-    """The constants of one finding; None where nothing is added to the machine."""
+    """The plausibility of a finding; None if it adds no effects to the machine."""
     if not effects:
         return None
     machine = data.machine.replace(effects=tuple(effects))
@@ -126,14 +125,14 @@ def _size(largest: tuple[float, float], bounds: tuple[float, float] | None) -> l
 
 
 def _sign(machine: Machine, effects: Sequence[Effect]) -> list[str]:
-    """Play that is negative: the control takes out more than there is."""
+    """A remark if the backlash is negative: the control compensates more than there is."""
     if any(runs_ahead(axis, effects[0]) for axis in machine.axes):
         return ["negative lost motion: the control's own backlash compensation takes out more than there is"]
     return []
 
 
 def carriers(machine: Machine, effects: Sequence[Effect]) -> tuple[str, ...]:
-    """`fix` and the controls of `export` that can hold all of the effects, or none where none is added."""
+    """The targets that can correct all of the effects: `fix`, and exports; empty if there are no effects."""
     if not effects:
         return ()
     kept = [set(_tables(machine, effect)) for effect in effects]
@@ -143,13 +142,13 @@ def carriers(machine: Machine, effects: Sequence[Effect]) -> tuple[str, ...]:
 
 
 def conditions(machine: Machine, effects: Sequence[Effect]) -> tuple[str, ...]:
-    """What must be stated for a program because no control looks it up: temperatures, time, load."""
+    """Inputs of the effects that a user must state because no control knows them: temperatures, time, load."""
     signals = {part for effect in effects for name in (effect.signal, effect.times) if name for part in name.split(SUM)}
     return tuple(sorted(signals - set(machine.axis_names)))
 
 
 def _of_play(effect: Effect, basis: Backlash, rotary: set[str], alone: bool) -> Sequence[str]:
-    """The controls that hold play: of an axis along or about itself in their places for that, else in tables."""
+    """The exports that hold a backlash effect; `alone`: it is a positioning error over its own axis only."""
     if not alone:
         return ("siemens",)
     if effect.joint in rotary:

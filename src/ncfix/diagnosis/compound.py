@@ -1,7 +1,7 @@
-"""A named effect, and names that say the same together: scales that are all alike, and two axes that are not square.
+"""Findings of a diagnosis, and findings that are reported as one: a common temperature, a squareness.
 
-Scales of all axes that grow by the same share are what a temperature does: one finding, with kelvin. A squareness is
-one error, whichever of its two axes carries it in a machine file; the set-up decides which, where it tells.
+Scales of all axes that are off by the same share are what a temperature does: one finding, stated in kelvin. A
+squareness is one error, whichever of its two axes carries it in a machine file.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from ncfix.machine.basis import Polynomial
 from ncfix.values import frozen
 
 LIKE = 0.25
-"""Share of their mean by which scales may differ and still be one temperature's."""
+"""Largest difference of scale errors from their mean, as a share of it, at which one temperature explains them."""
 STEEL = 11.5e-6
-"""Growth of steel per kelvin."""
+"""Thermal expansion of steel, 1/K."""
 SCALE = re.compile(r"(?:scale |constant E(?=[XYZ][XYZ]$))([XYZ])\1?$")
 LINE = re.compile(r"(constant )?E([ABC])0([XYZ])$")
 
@@ -33,13 +33,13 @@ LINE = re.compile(r"(constant )?E([ABC])0([XYZ])$")
 class EffectFinding:
     """One named effect.
 
-    candidate   what it is
-    odds        log odds against its not being there, given the others; p_value by chance for any name
-    aliases     names that explain its part nearly as well
-    size_um     rms of what it shows
-    effects     as they stand in the machine file; empty for what belongs to the measurement
-    shown       (m,) what it shows, um
-    judgement   whether its constants are such as machines have; None where there are none
+    candidate   the effect in the catalogue
+    odds        log odds that it is there, given the others; p_value: probability that noise gives any name such odds
+    aliases     names that explain the same data nearly as well
+    size_um     rms of its effect on the values
+    effects     the effects added to the machine file; empty if it belongs to the measurement
+    shown       (m,) its effect on the values, um
+    judgement   plausibility of its coefficients; None if it has none
     """
 
     candidate: Candidate
@@ -55,12 +55,12 @@ class EffectFinding:
 def compound(
     data: ResidualData, findings: Sequence[EffectFinding], moved: Sequence[MovedConstant]
 ) -> tuple[EffectFinding, ...]:
-    """The findings, with scales that are alike as one, and squareness under its name."""
+    """The findings, with equal scale errors merged into one temperature and squareness named as such."""
     return _temperature(data, [_squareness(each) for each in findings], moved)
 
 
 def _squareness(finding: EffectFinding) -> EffectFinding:
-    """One of a line error that another axis carries as well: the squareness of the two."""
+    """The finding, titled as the squareness of two axes if it is the tilt of one with that of the other as an alias."""
     own = LINE.match(finding.candidate.name)
     aliases = (LINE.match(name) for name in finding.aliases)
     other = next((each for each in aliases if own and each and each[2] == own[2] and each[3] != own[3]), None)
@@ -74,7 +74,7 @@ def _squareness(finding: EffectFinding) -> EffectFinding:
 def _temperature(
     data: ResidualData, findings: Sequence[EffectFinding], moved: Sequence[MovedConstant]
 ) -> tuple[EffectFinding, ...]:
-    """Scales of all linear axes that were moved, if they differ little: one finding in the place of the largest."""
+    """The findings, with the scale errors of all moved linear axes merged into one if they are nearly equal."""
     changes = {f"constant {each.name}": each.data - each.file for each in moved}
     shares = {}
     for each in findings:
@@ -111,7 +111,7 @@ def _temperature(
 
 
 def _share(finding: EffectFinding, change: float | None) -> float:
-    """By what share of the way a scale is too long: of its only effect, or of the change of a constant of the file."""
+    """Relative scale error of a finding: of its linear effect, or the change of the file's constant; NaN if neither."""
     effect: Effect = finding.effects[0]
     if not isinstance(effect.basis, Polynomial) or effect.basis.degree != (1,):
         return float("nan")

@@ -1,13 +1,14 @@
-"""Constants of the machine file that the data put elsewhere: judged together, named as far as they can be told.
+"""Constants of the machine file (location errors, gains) that differ from what the data say.
 
-The data see combinations of constants, so each by itself may look known badly although the file is wrong by far. The
-fit holds what cannot be told exactly as `calibrate` does (`ncfix.measure.least_squares.solve`); of the others the
-smallest set is sought whose change explains the misfit. A set has log odds like a name has: its constants are taken
-as independent, of a size at the tool tip, and each pays for what it was chosen from. The distance of the file from all
-that can be told together is Mahalanobis' (chi-square).
+The data determine combinations of constants, so each constant by itself may look uncertain although the file is far
+off. The fit holds the constants that the data cannot determine, exactly as `calibrate` does
+(`ncfix.measure.least_squares.solve`). Among the others it seeks the smallest set whose change explains the misfit. Such
+a set has log odds, like a named effect: its constants are independent a priori, of a common size at the tool tip, and
+each pays a price for having been chosen among all. The distance of the file from the data, over all constants that can
+be determined, is Mahalanobis' (chi-square).
 
-All likelihoods of the ladder are of the same values, with only the set-up free: so odds of constants, names and
-mistakes are on one scale.
+All likelihoods of the ladder are of the same values, with only the set-up free. So the odds of constants, named effects
+and mistakes are on one scale.
 """
 
 from __future__ import annotations
@@ -30,24 +31,25 @@ from ncfix.measure.selection import Selection
 from ncfix.values import frozen
 
 FIRST_UM, TIMES, STEPS = 1.5, 3.0, 10
-"""Sizes of a change at the tool tip that are considered, um: from the first on, each so many times the one before."""
-MOST = 6
-"""Constants that are named one by one; where more are off the file as a whole is."""
+"""Assumed sizes of a change at the tool tip: `STEPS` of them, from `FIRST_UM` um on, each `TIMES` the one before."""
+MAX_NAMED = 6
+"""Largest number of constants that are named one by one; if more are off, the file as a whole is reported."""
 DOUBT = 3.0
-"""Standard deviations of a chi-square beyond which the constants that stay do not explain the data."""
-ALIKE = 3.0
+"""Standard deviations beyond which a difference, or an excess of chi-square, is significant."""
+ALIAS_LOG_ODDS = 3.0
 """Log odds (20 to 1) within which another constant explains the data as well."""
-HELPS = 0.1
-"""Log odds by which a change of the set must help."""
+MIN_GAIN = 0.1
+"""Log odds that a change of the set must gain."""
 
 
 @frozen
 class MovedConstant:
-    """A constant of the machine file that the data put elsewhere, surely: mm or rad, with its standard deviation.
+    """A constant of the machine file whose value the data contradict.
 
-    unit     what these are multiplied with to be in the unit that people use, and its name
-    odds     log odds that it is off, the others given; aliases: constants that explain its part as well
-    size_um  how far its change moves what was measured, rms beside the set-up
+    file, data  the value in the file and by the data, mm or rad; sigma: standard deviation of the latter
+    unit     (factor from mm or rad to the usual unit, name of that unit)
+    odds     log odds that it is off, given the others; aliases: constants that explain the same data as well
+    size_um  rms change of the measured values by its correction, that part which the set-up cannot absorb
     """
 
     name: str
@@ -61,22 +63,22 @@ class MovedConstant:
 
     @property
     def turned(self) -> bool:
-        """Whether it is the file's value with the other sign."""
+        """Whether the data give the file's value with the opposite sign."""
         return abs(self.file) > DOUBT * self.sigma and abs(self.file + self.data) < DOUBT * self.sigma
 
 
 @frozen(repr=False, slots=False)
 class ConstantsVerdict:
-    """What the data say of all constants of the file together.
+    """The verdict of the data on all constants of the file together.
 
-    change    (k,) what is to be added to the file's values, mm or rad; zero for those that stay
-    moved     the constants that change surely, those that matter most first
-    odds      log odds that any is off; what they were chosen from is counted
-    distance, freedom  chi-square of the file's constants against the data over all that can be told, and of how many
-    size_um   how far the changes move what was measured, rms beside the set-up
-    shown     (m,) what they show, um
-    solution  of the fit: what could not be told, and of which only combinations are seen
-    paid      what the changes pay
+    change    (k,) correction to the file's values, mm or rad; zero for constants that stay
+    moved     the constants that are significantly off, those with the largest effect first
+    odds      log odds that any constant is off, less the price for the choice
+    distance, freedom  chi-square of the file's constants against the data, and its degrees of freedom
+    size_um   rms change of the measured values by all corrections, beside the set-up
+    shown     (m,) change of each measured value by all corrections, um
+    solution  the fit: which constants could not be determined, and which only in combinations
+    paid      price of the changes, log odds
     whole     the file as a whole is off: more constants than can be named one by one
     """
 
@@ -92,9 +94,9 @@ class ConstantsVerdict:
     paid: float
 
     def remedy(self, probed: str = "") -> str:
-        """What to do; `probed`: the rotary axis whose place it is, if only probing has seen it.
+        """The advice to the user. `probed`: the rotary axis whose position is off, if only probing has measured it.
 
-        That such an axis moved, and that the file has its point wrong, look the same to a probe.
+        A probe cannot distinguish an axis that has moved from a wrong axis point in the file.
         """
         anew = "use the new machine file, or calibrate the machine anew"
         point = f"; if the control has the point of {probed} elsewhere than the old file, "
@@ -103,7 +105,7 @@ class ConstantsVerdict:
 
     @property
     def p_value(self) -> float:
-        """How likely constants so far from the file's are by chance."""
+        """Probability of so large a distance if the file is right."""
         return float(chdtrc(max(self.freedom, 1), self.distance))
 
     @property
@@ -115,9 +117,11 @@ class ConstantsVerdict:
 
 @frozen(repr=False, slots=False)
 class FileLikelihood:
-    """Likelihoods of the values about the machine file as it stands, with some constants or names there.
+    """Likelihood of the measured values given the machine file, with some constants changed and some effects added.
 
-    evidence  of the data; `members` are there, at this share of a little of everything
+    evidence  the evidence of the data
+    members   the effects that are added
+    share     size of the background of small effects, in units of the noise
     """
 
     evidence: Evidence
@@ -131,28 +135,28 @@ class FileLikelihood:
 
     @cached_property
     def from_file(self) -> Array:
-        """(m,) values minus what the file's own constants and the fitted set-up say, um."""
+        """(m,) measured values minus the prediction of the unchanged file with the fitted set-up, um."""
         data = self.data
         back = data.problem.selection.start - data.coefficients
         return data.y - self.constants @ back
 
     @property
     def constants(self) -> Array:
-        """(m, k) what the free constants show, um per mm or rad."""
+        """(m, k) derivatives of the values by the free constants, um per mm or rad."""
         count = len(self.data.coefficients)
         return self.data.base[:, self.data.base.shape[1] - count :]
 
     @property
     def setup(self) -> Array:
-        """(m, j) what the unknown set-up shows."""
+        """(m, j) derivatives of the values by the unknowns of the set-up."""
         return self.data.base[:, : self.data.base.shape[1] - len(self.data.coefficients)]
 
     @cached_property
     def white(self) -> tuple[list[Array], float]:
-        """Where noise and background are white: the set-up (m, j), members at their sizes (m, p), constants (m, k) and
-        the values from the file (m, 1); and the log determinant of their covariance.
+        """Whitened columns of set-up (m, j), members at their sizes (m, p), constants (m, k) and the values (m, 1); and
+        the log determinant of the covariance of noise and background.
 
-        The root of the inverse covariance that makes them so, (m, m), is let go of at once.
+        They are multiplied by a root of the inverse covariance, (m, m), which is not kept: it is large.
         """
         groups = self.evidence.groups
         named = [m.size * groups[m.group].columns for m in self.members]
@@ -172,13 +176,13 @@ class FileLikelihood:
 
     @cached_property
     def sizes(self) -> Array:
-        """(k,) how much a constant shows per mm or rad, um; zero where nothing."""
+        """(k,) rms effect of each constant on the values, um per mm or rad; zero if the data do not see it."""
         return np.array([self.data.size(column) for column in self.constants.T])
 
     @cached_property
     def _products(self) -> tuple[Array, Array, float]:
-        """Inner products beside the set-up of white members at their sizes and constants of 1 um: with themselves, with
-        the values; and of these.
+        """Inner products of the whitened columns Z (members at their sizes, constants at 1 um) and values y, all
+        orthogonal to the set-up: Z'Z, Z'y and y'y.
         """
         _, named, constants, y = self.white[0]
         unit = constants / np.where(self.sizes > 0, self.sizes, 1.0)
@@ -187,7 +191,7 @@ class FileLikelihood:
         return inner[:-1, :-1], inner[:-1, -1], float(inner[-1, -1])
 
     def likelihood(self, moved: Sequence[int] = ()) -> float:
-        """Log likelihood of the values with the members and these constants (their numbers) off, of whatever size."""
+        """Log likelihood of the values if the constants with the indices `moved` are off, averaged over all sizes."""
         if not len(moved):
             return self._at((), 1.0)
         return float(logsumexp([self._at(moved, size) for size in self._steps]) - np.log(len(self._steps)))
@@ -211,9 +215,9 @@ class FileLikelihood:
         return marginal(squares, determinant, count, freedom)
 
     def solution(self, first: Sequence[int] = ()) -> Solution:
-        """Least squares of all constants from the file on, beside set-up and members; what cannot be told is held.
+        """Least-squares changes of all constants beside set-up and members; undetermined constants are held.
 
-        Of constants of which only a combination is seen those in `first` are kept, and the others held.
+        Where the data see only a combination of constants, those in `first` are fitted and the others held.
         """
         setup, named, constants, y = self.white[0]
         extra, scale = named.shape[1], np.linalg.norm(self.setup, axis=0)
@@ -221,7 +225,7 @@ class FileLikelihood:
         prior = np.concatenate([np.zeros((extra, setup.shape[1])), np.eye(extra)], axis=1)
         still = np.zeros((extra, constants.shape[1]))
         limits = self.data.problem.limits.copy()
-        limits[list(first)] = np.inf  # what is seen little with all others free may be seen well by itself
+        limits[list(first)] = np.inf  # badly determined with all others free, it may be well determined by itself
         order = np.array([*first, *(k for k in range(still.shape[1]) if k not in set(first))], dtype=np.int64)
         found = solve(
             np.concatenate([constants, still])[:, order],
@@ -233,7 +237,7 @@ class FileLikelihood:
 
 
 def judged_constants(evidence: Evidence, members: Sequence[Member], share: float) -> ConstantsVerdict:
-    """Which constants the data put elsewhere, with these names there."""
+    """The constants that the data contradict, given the effects in `members`."""
     asked = FileLikelihood(evidence, members, share)
     data, k = asked.data, len(asked.data.coefficients)
     plainly = asked.solution()
@@ -251,9 +255,9 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
     explained = _gained(inner, seen, places) / scale
     left, spare = distance - explained, len(kept) - len(chosen)
     whole = spare > 0 and left > spare + DOUBT * np.sqrt(2 * spare) and left > 2 * DOUBT**2
-    whole &= left > explained or len(chosen) == MOST  # else the chosen ones matter, the others are the day's
+    whole &= left > explained or len(chosen) == MAX_NAMED  # else the chosen ones matter, the rest is daily change
     every = [int(each) for each in kept]
-    whole = whole and _weight(asked, every, offered) > asked.likelihood()  # else they are the day's, all of them
+    whole = whole and _weight(asked, every, offered) > asked.likelihood()  # else all of them vary from day to day
     if whole:
         chosen, places = every, np.arange(len(every), dtype=np.int64)
     spread: Array = _inverse(inner[np.ix_(places, places)])
@@ -297,34 +301,34 @@ def judged_constants(evidence: Evidence, members: Sequence[Member], share: float
 
 
 def _inverse(matrix: Array) -> Array:
-    """Of a matrix that may be empty."""
+    """The inverse of a matrix, which may be empty."""
     return np.asarray(np.linalg.inv(matrix) if len(matrix) else matrix, dtype=np.float64)
 
 
 def names_of(selection: Selection) -> list[str]:
-    """A name for each free constant: of its effect where that has no other, else with the power."""
+    """A name for each free constant: the name of its effect if that has one coefficient only, else with the power."""
     names = [effect.name for effect in selection.estimated for _ in range(effect.basis.size)]
     return [name if names.count(name) == 1 else label for name, label in zip(names, selection.labels, strict=True)]
 
 
 def _gained(inner: Array, seen: Array, places: Ints) -> float:
-    """Squares that these constants explain."""
+    """Part of chi-square that the constants at `places` explain."""
     own = seen[places]
     return float(own @ np.linalg.solve(inner[np.ix_(places, places)], own)) if len(places) else 0.0
 
 
 def _price(count: int, among: int) -> float:
-    """What so many constants pay: for what they were chosen from, and for being there."""
+    """Price, log odds, of changing `count` constants chosen from `among`."""
     return count * float(np.log(max(among, 1))) + SURE + (count - 1) * FURTHER if count else 0.0
 
 
 def _weight(asked: FileLikelihood, moved: Sequence[int], offered: Sequence[int]) -> float:
-    """Log likelihood with these constants off, less what they pay."""
+    """Log likelihood with these constants off, less their price."""
     return asked.likelihood(moved) - _price(len(moved), len(offered))
 
 
 def _chosen(asked: FileLikelihood, offered: Sequence[int]) -> list[int]:
-    """The constants whose change weighs most, found by adding, exchanging and dropping one at a time."""
+    """The set of constants with the largest weight, found by adding, exchanging and dropping one at a time."""
 
     def weight(chosen: Sequence[int]) -> float:
         return _weight(asked, chosen, offered)
@@ -332,28 +336,29 @@ def _chosen(asked: FileLikelihood, offered: Sequence[int]) -> list[int]:
     chosen: list[int] = []
     best = weight(chosen)
     while True:
-        tried = [[*chosen, each] for each in offered if each not in chosen and len(chosen) < MOST]
+        tried = [[*chosen, each] for each in offered if each not in chosen and len(chosen) < MAX_NAMED]
         for out in chosen:
             less = [each for each in chosen if each != out]
             tried += [less, *([*less, each] for each in offered if each not in chosen)]
-        found = max(tried, key=weight, default=chosen)
-        if weight(found) <= best + HELPS:
+        candidate = max(tried, key=weight, default=chosen)
+        if weight(candidate) <= best + MIN_GAIN:
             return sorted(chosen)
-        chosen, best = found, weight(found)
+        chosen, best = candidate, weight(candidate)
 
 
 def _own(
     asked: FileLikelihood, chosen: Sequence[int], index: int, offered: Sequence[int]
 ) -> tuple[float, tuple[int, ...]]:
-    """Log odds that one is off, the others given, and the constants that explain its part as well."""
+    """Log odds that constant `index` is off, given the other chosen ones; and the constants that do as well instead."""
     others = [each for each in chosen if each != index]
     with_all, less = asked.likelihood(chosen), asked.likelihood(others)
-    alike = [each for each in offered if each not in chosen and asked.likelihood([*others, each]) > with_all - ALIKE]
+    near = with_all - ALIAS_LOG_ODDS
+    alike = [each for each in offered if each not in chosen and asked.likelihood([*others, each]) > near]
     return with_all - less - float(np.log(max(len(offered), 1))), tuple(alike)
 
 
 def _renumbered(found: Solution, order: Ints) -> Solution:
-    """A solution whose columns were in another order; `order` says which is which."""
+    """A solution with its columns in the original order: column i of `found` is constant `order[i]`."""
     change = np.zeros(len(order))
     change[order] = found.change
     back = np.argsort(order[found.kept])

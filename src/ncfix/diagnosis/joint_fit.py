@@ -1,8 +1,7 @@
-"""The named effects in the model: all coefficients fitted together, and the machine file that has them.
+"""The joint fit of all constants and named effects, the machine file with the result, and its cross-validation.
 
-Does it predict what was not used to find it? Whole regions of the poses are left out, one quarter at a time.
-
-What a name must show besides evidence: that it predicts, and that it matters.
+Cross-validation leaves out whole regions of the poses, a quarter of the regions at a time. A name is kept only if it
+improves the prediction of held-out poses and is large enough to matter (`passing`).
 """
 
 from __future__ import annotations
@@ -26,29 +25,31 @@ from ncfix.measure.least_squares import orthonormal, without
 from ncfix.values import frozen
 
 WIDE = 1e3
-"""um: how far a constant of the machine file may be off; wide enough to be no prior, and what cannot be seen stays."""
+"""Prior standard deviation of a constant, um at the tool tip: hardly a prior, but unseen constants stay unchanged."""
 TRACE = 1e-12
+"""Share of a loading below which a coefficient counts as unused."""
 REGIONS = 16
 FOLDS = 4
 BLIND = 1e2
-"""Times the noise: a value predicted no better than this has a set-up that nothing else shares; it does not count."""
+"""A held-out value whose prediction is less certain than this many times the noise is ignored: its set-up is not
+determined by the other values."""
 SHARP = 6.0
-"""What drives do at a few places only counts by its largest value over this, if that is more than its rms."""
+"""An effect of the drives, which acts at a few places only, counts with its rms or its largest value over this."""
 MATERIAL_UM = 0.8
-"""An effect that moves the tool tip by less is not worth a name."""
+"""An effect that moves the tool tip by less than this, um rms, is not worth a name."""
 RATHER = 0.5
-"""An effect smaller than this share of what has no name is as good as part of it."""
+"""An effect smaller than this share of the unnamed remainder may as well be part of that."""
 
 
 @frozen(slots=False)
 class JointFit:
-    """Everything fitted at once.
+    """Result of fitting constants and members together.
 
-    constants   (k,) changes of the free constants of the machine file, from where the view has them
+    constants   (k,) changes of the free constants, mm or rad, from `ResidualData.coefficients`
     sigmas      (k,) their standard deviations
-    numbers     for each member (p,) the numbers behind its coefficients; `covariances` of them
-    shown       for each member (m,) what it shows, um
-    before      (m,) residual with the constants alone; after with the members
+    numbers     for each member (p,) its independent numbers (before the loading); covariances: (p, p) of them
+    shown       for each member (m,) its effect on the values, um
+    before      (m,) residual with the constants alone, um; after: with the members
     """
 
     constants: Array
@@ -61,15 +62,15 @@ class JointFit:
 
     @property
     def together(self) -> Array:
-        """What all members show, (m,) um."""
+        """Effect of all members together on the values, (m,) um."""
         whole: Array = np.sum([np.zeros(len(self.before)), *self.shown], axis=0)
         return whole
 
 
 def fitted(evidence: Evidence, members: Sequence[Member], share: float, stay: Mask | None = None) -> JointFit:
-    """The most probable coefficients of constants and members together, and the residuals.
+    """Fit constants and members together, by maximum posterior probability.
 
-    stay  (k,) free constants that are left as the machine file has them; None: none
+    stay  (k,) constants that keep the value of the machine file; None: all are fitted
     """
     data, free = evidence.background.data, evidence.background.data.base
     back = data.problem.selection.start - data.coefficients
@@ -96,7 +97,7 @@ def fitted(evidence: Evidence, members: Sequence[Member], share: float, stay: Ma
 
 
 def _lengths(columns: Array) -> Array:
-    """Sizes of columns as root mean squares, one for those that are zero."""
+    """Root mean square of each column; 1 for columns of zeros."""
     size = np.sqrt((columns**2).mean(axis=0))
     return np.where(size > 0, size, 1.0)
 
@@ -111,7 +112,7 @@ def _solved(columns: Array, y: Array, precision: Array, prior: Array) -> tuple[A
 def machine_with(
     evidence: Evidence, members: Sequence[Member], joint: JointFit
 ) -> tuple[Machine, list[tuple[Effect, ...]]]:
-    """The machine with constants changed and effects added; and the effects that each member brought."""
+    """The machine with the fitted constants and effects; and the effects that each member added."""
     data = evidence.background.data
     start = data.problem.selection.start
     coefficients = data.coefficients + joint.constants
@@ -126,7 +127,7 @@ def machine_with(
 
 
 def effects_of(group: EffectForm, numbers: Array, spread: Array) -> tuple[Effect, ...]:
-    """The effects of a form with their coefficients, without those that are zero; none for what is no error."""
+    """The effects of a form with fitted coefficients, unused ones left out; empty if it is no error of the machine."""
     if group.owner.kept_out:
         return ()
     values = group.loading @ numbers
@@ -142,7 +143,7 @@ def effects_of(group: EffectForm, numbers: Array, spread: Array) -> tuple[Effect
 
 
 def _trimmed(effect: Effect, values: Array, covariance: Array, own: Array) -> Effect:
-    """The effect with its coefficients; orders and powers that the form does not have are left out."""
+    """The effect with coefficients and covariance; orders and powers that the form does not use are left out."""
     basis, keep = _fewer(effect.basis, own)
     even = (covariance + covariance.T)[np.ix_(keep, keep)] / 2
     return replace(
@@ -163,7 +164,11 @@ def _fewer(basis: Basis, own: Array) -> tuple[Basis, Array]:
 
 @frozen(slots=False)
 class HeldOut:
-    """Prediction errors of all values while they were held out, um, (m,); NaN where none was possible."""
+    """Prediction errors of held-out values, um, (m,); NaN where no prediction was possible.
+
+    without, with_all  without any member, and with all; less: for each member, with all others
+    cell               (m,) region of poses of each value
+    """
 
     without: Array
     with_all: Array
@@ -172,9 +177,9 @@ class HeldOut:
 
 
 def held_out_as_given(evidence: Evidence, from_file: Array, setup: Array, share: float) -> Array:
-    """Prediction errors (m,) um of the machine file as it stands, its set-up fitted to the other regions.
+    """Prediction errors (m,) um of the unchanged machine file, its set-up fitted to the other regions.
 
-    from_file  (m,) values minus what the file says; setup (m, j) what the unknown set-up shows
+    from_file  (m,) values minus the file's prediction, um; setup (m, j): derivatives by the unknowns of the set-up
     """
     background = evidence.background
     columns = WIDE * setup / _lengths(setup)
@@ -182,16 +187,18 @@ def held_out_as_given(evidence: Evidence, from_file: Array, setup: Array, share:
 
 
 def _folds(data: ResidualData) -> tuple[Ints, list[Mask]]:
-    """The region of each value, (m,), and which values are held out in turn."""
+    """The region of each value, (m,), and for each fold a mask of the values that it holds out."""
     cell = pose_regions(scaled_axes(data))[np.maximum(data.row, 0)]
     return cell, [(cell % FOLDS == fold) & (data.row >= 0) for fold in range(FOLDS)]
 
 
 @frozen(slots=False)
 class Gap:
-    """Root mean square of residual lengths, um: before, after, the noise floor, and the first two on held-out poses.
+    """Root mean square of residual lengths, um.
 
-    given, holdout_given  with the machine file as it stands: only the set-up is fitted
+    before, after  with the constants alone, and with the findings; holdout_...: the same on held-out poses
+    floor          the noise
+    given, holdout_given  with the unchanged machine file: only the set-up is fitted
     """
 
     before: float
@@ -204,7 +211,7 @@ class Gap:
 
 
 def held_out(evidence: Evidence, members: Sequence[Member], share: float) -> HeldOut:
-    """Predict each region from the others: without members, with all, and with all but each one."""
+    """Predict each fold of regions from the others: without members, with all, and with all but one in turn."""
     background = evidence.background
     data = background.data
     cell, tests = _folds(data)
@@ -216,11 +223,10 @@ def held_out(evidence: Evidence, members: Sequence[Member], share: float) -> Hel
 
 
 def _predicted(background: Background, y: Array, signal: Array, share: float, tests: Sequence[Mask]) -> Array:
-    """Errors of the predictions of each fold of values y from the others, for a signal whose columns are there at
-    unit size.
+    """Errors of predicting each fold of the values y from the others. The columns of `signal` have unit variance.
 
-    With Q the inverse of the covariance of all values, the block of Q of a fold says what the others tell of it: with
-    the fold's values so replaced, Q y are the weights of the others, and the signal alone is carried over to the fold.
+    With Q the inverse covariance of all values, the block of Q that belongs to a fold gives the fold's prediction from
+    the others. With the fold's values replaced by it, Q y weighs the others, and only the signal is carried over.
     """
     precision = background.precision(share)
     weighed = precision @ signal
@@ -240,7 +246,7 @@ def _predicted(background: Background, y: Array, signal: Array, share: float, te
 
 
 def pose_regions(u: Array, count: int = REGIONS) -> Ints:
-    """Regions (n,) of poses u (n, k), with equally many rows: halved at the median of the widest way over and over."""
+    """The region (n,) of each pose u (n, k): equal counts, by repeated halving at the median of the widest axis."""
     label = np.zeros(len(u), dtype=np.int64)
     for _ in range(int(np.log2(count))):
         new = np.empty_like(label)
@@ -257,7 +263,10 @@ def pose_regions(u: Array, count: int = REGIONS) -> Ints:
 
 
 def prediction_gain(held: HeldOut, worse: Array) -> tuple[float, float]:
-    """How much larger the squares are with another model, per region, and the standard error of that."""
+    """Mean increase per region of the squared prediction errors with another model; and its standard error.
+
+    worse  (m,) prediction errors of the other model, um
+    """
     known = np.isfinite(held.with_all) & np.isfinite(worse)
     per = [
         float((worse[k] ** 2 - held.with_all[k] ** 2).sum())
@@ -268,9 +277,9 @@ def prediction_gain(held: HeldOut, worse: Array) -> tuple[float, float]:
 
 
 def passing(scale: Comparison, selected: Selected) -> Selected:
-    """Without the names that do not predict held-out poses by more than one standard error, or are immaterial.
+    """Drop the names that do not improve held-out predictions by more than one standard error, or are immaterial.
 
-    One leaves at a time, the least likely first: the others may then be needed more.
+    One is dropped at a time, the least likely first, since the others may then be needed more.
     """
     while failed := _failed(scale, selected):
         weakest = min(failed, key=lambda name: selected.odds[name])
@@ -301,8 +310,9 @@ def _failed(scale: Comparison, selected: Selected) -> list[str]:
 
 
 def unnamed_by_view(evidence: Evidence, selected: Selected, whole: JointFit, keep: Mask | None = None) -> Array:
-    """How much of what the names leave something without a name explains, um in each sort of rows; `whole` is the fit
-    with both.
+    """Size, um rms per sort of rows, of the part of the residual that only unnamed alternatives explain.
+
+    whole  the fit with names and alternatives
     """
     data, every = evidence.background.data, list(selected.members.values())
     left = whole.after
@@ -313,11 +323,11 @@ def unnamed_by_view(evidence: Evidence, selected: Selected, whole: JointFit, kee
 
 
 def _stands_behind(scale: Comparison, selected: Selected, name: str) -> bool:
-    """Whether it is a constant beside effects that can do the same where it is left out."""
+    """Whether a name is a constant beside other effects, which can imitate it when it is left out."""
     return scale.evidence.constant(name) and not all(scale.evidence.constant(each) for each in selected.named)
 
 
 def visible(data: ResidualData, shown: Array) -> Array:
-    """What an effect shows, (m,) um, beside what is free."""
+    """The part (m,) um of an effect on the values that set-up and constants cannot absorb."""
     free = orthonormal(data.base / data.relative[:, None])
     return without(free, (shown / data.relative)[:, None])[:, 0] * data.relative

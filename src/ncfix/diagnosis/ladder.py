@@ -1,8 +1,8 @@
-"""The ladder of a diagnosis: from the machine file as it was given, rung by rung, down to the noise.
+"""The ladder of a diagnosis: how each kind of finding reduces the misfit, from the given machine file to the noise.
 
-Each rung explains a share of the squares of the misfit as it was given. Its evidence is the natural logarithm of how
-much likelier the data are with it, less what it pays; all rungs are on that scale. What is left in the end is noise as
-far as noise leaves so much by chance; else what exceeds the noise is not explained.
+Each rung explains a share of the squared misfit of the given file. Its evidence is the natural logarithm of how much
+likelier the data are with it, less its price; all rungs are on that scale. The last residual is noise if noise alone
+leaves so much by chance; otherwise the excess over the noise is unexplained.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ GIVEN, MISTAKES, CONSTANTS, NAMED, UNNAMED, UNEXPLAINED, NOISE = (
 
 @frozen
 class Rung:
-    """One step down.
+    """One row of the ladder.
 
-    name        which; `found` are the findings on it
-    left_um     what is left below it, rms um; holdout_um the same on poses left out of the fit, NaN where not known
-    share       of the squares of the misfit as given that it explains; of the noise: what is left of them
-    log_odds    its evidence; NaN for the first and the last two
+    name        kind of finding; found: names of the findings
+    left_um     rms residual below it, um; holdout_um: the same on held-out poses, NaN if unknown
+    share       part of the squared misfit of the given file that it explains; for the noise: that remains
+    log_odds    its evidence; NaN for the first rung and the last two
     """
 
     name: str
@@ -42,7 +42,7 @@ class Rung:
 
 
 def ladder(diagnosis: Diagnosis) -> tuple[Rung, ...]:
-    """All rungs; that of mistakes is always there, and empty where none was made."""
+    """All rungs in order; a rung without findings is included."""
     gap, wrong, none = diagnosis.gap, diagnosis.mistake, float("nan")
     first = gap.given if wrong is None else wrong.given_um
     names = {each.candidate.name: each.candidate.family for each in diagnosis.findings}
@@ -57,8 +57,8 @@ def ladder(diagnosis: Diagnosis) -> tuple[Rung, ...]:
         (UNNAMED, below, none, diagnosis.rest.odds, diagnosis.rest.titles),
     ]
     found, above = [Rung(GIVEN, first, gap.holdout_given if wrong is None else none, 0.0, none)], first
-    for name, left, held, odds, those in steps:
-        found.append(Rung(name, left, held, _share(above**2 - left**2, first), odds, those))
+    for name, left, held, odds, names_on_rung in steps:
+        found.append(Rung(name, left, held, _share(above**2 - left**2, first), odds, names_on_rung))
         above = min(left, above)
     noise = min(gap.floor, above) if diagnosis.rest.lacking else above
     found.append(Rung(UNEXPLAINED, noise, none, _share(above**2 - noise**2, first), none))
@@ -71,7 +71,7 @@ def _share(squares: float, given: float) -> float:
 
 
 def in_words(rungs: tuple[Rung, ...]) -> list[tuple[str, str, str, str, str, str]]:
-    """The rows of a table: rung, what is left, held out, share, evidence, what was found."""
+    """The rows of a table: rung, residual, held-out residual, share, evidence, findings."""
     rows = []
     for rung in rungs:
         held = "" if np.isnan(rung.holdout_um) else f"{rung.holdout_um:.2f}"
