@@ -1,8 +1,8 @@
-"""Arcs in their plane: centre, closure and sweep from the words of a block.
+"""Geometry of programmed arcs in their plane: centre, closure and sweep angle.
 
-Pure geometry, mm and rad; points are (first, second)
-coordinates of the plane relative to the arc's start. Rules and tolerances are LinuxCNC's (interp_arc.cc,
-interp_internal.hh, read for the facts; tried out on `rs274`).
+Pure functions. Lengths in mm, angles in rad; a point is (first, second) coordinate of the plane, relative to the start
+of the arc. The rules and tolerances are those of LinuxCNC (facts read in interp_arc.cc and interp_internal.hh, checked
+with `rs274`).
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ from ncfix.control.expressions import Fault
 Point = tuple[float, float]
 
 CLOCKWISE, COUNTER = 20, 30
-"""The motion codes of arcs, G2 and G3."""
+"""Motion codes of clockwise and counter-clockwise arcs (G2, G3), in tenths."""
 
 ARC_FAULT = "NCF220"
 ZERO_RADIUS = 0.00127
-"""A smaller radius counts as none, and an R arc may miss its end by as much (LinuxCNC: 0.00005 inch)."""
+"""Smallest radius of an arc, mm, and largest distance by which an R arc may miss its end (LinuxCNC: 0.00005 inch)."""
 
 SEMICIRCLE = 1e-12
-"""An R arc this near to a semicircle, relative, is one."""
+"""An R arc whose half chord is within this relative distance of the radius is taken as a semicircle."""
 
 FUZZ = 1e-6
-"""An arc of a smaller angle, rad, is a full circle."""
+"""Smallest sweep, rad: below it, an arc is a full circle."""
 
 HOPELESS = 100.0
-"""Beyond so many times the closure tolerance an arc is refused whatever its radius."""
+"""An arc that misses its end by more than this multiple of the closure tolerance is refused, whatever its radius."""
 
 
 def check_closure(centre: Point, end: Point, absolute: float, relative: float) -> None:
-    """Raise `Fault` if the control refuses an arc whose radii at start and end differ.
+    """Raise `Fault` if the control would refuse the arc because its radii at start and end differ.
 
-    It does if they differ by more than `absolute` (mm) and by more than `relative` of the greater one, or by more than
-    a hundred times `absolute`.
+    It refuses if they differ by more than `absolute` (mm) and also by more than `relative` times the greater radius, or
+    by more than a hundred times `absolute`.
     """
     start_radius = math.hypot(*centre)
     end_radius = math.hypot(end[0] - centre[0], end[1] - centre[1])
@@ -52,7 +52,7 @@ def check_closure(centre: Point, end: Point, absolute: float, relative: float) -
 
 
 def centre_from_radius(end: Point, radius: float, *, clockwise: bool) -> Point:
-    """The centre of an arc given by R; negative R takes the longer of the two arcs. Raises `Fault`."""
+    """The centre of an arc given by R; negative R selects the longer arc. Raises `Fault` if there is none."""
     chord = math.hypot(*end)
     if chord == 0.0:
         raise Fault(ARC_FAULT, "an arc given by R must end elsewhere than it starts", "a full circle needs I J K")
@@ -67,7 +67,7 @@ def centre_from_radius(end: Point, radius: float, *, clockwise: bool) -> Point:
 
 
 def sweep_angle(centre: Point, end: Point, turns: int, *, clockwise: bool) -> float:
-    """The signed angle from start to end about the centre, positive counter-clockwise; `turns` - 1 whole turns more."""
+    """Sweep angle, rad, positive counter-clockwise, with `turns` - 1 additional full turns."""
     start_angle = math.atan2(-centre[1], -centre[0])
     end_angle = math.atan2(end[1] - centre[1], end[0] - centre[0])
     angle = start_angle - end_angle if clockwise else end_angle - start_angle

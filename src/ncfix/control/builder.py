@@ -1,5 +1,7 @@
-"""Motions gathered as columns: single ones in lists, which become columns later, and stretches that came together as
-arrays. No object is kept per motion.
+"""Collects the motions of a program as columns (`Moves`).
+
+Single motions are appended to lists and converted to arrays later; stretches that the fast lane followed at once arrive
+as arrays. No object is kept per motion.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from ncfix.values import mutable
 
 
 class MotionStyle(NamedTuple):
-    """What many motions have in common; `frame` and `reason` are indices."""
+    """Properties that many motions share; `frame` and `reason` are indices into the builder's tables."""
 
     kind: MotionKind
     rule: Rule
@@ -56,11 +58,11 @@ DTYPES: dict[str, type[np.generic]] = {
     "across": np.int8,
     "tcp_length": np.float64,
 }
-"""The types of the columns of `Moves` that styles hold; the others are flags."""
+"""Dtypes of the columns of `Moves` that come from styles; columns not listed are bool."""
 
 
 class Circles(NamedTuple):
-    """The circles of k arcs in one plane, as columns of `Arc`; `row` (k,): which of some motions these are."""
+    """Circles of k arcs in one plane, as columns of `Arc`; `row` (k,) is the index of each arc's motion."""
 
     row: Ints
     centre: Array
@@ -70,16 +72,16 @@ class Circles(NamedTuple):
 
 
 BUFFERED = 65536
-"""Motions that are kept as Python numbers before they become arrays."""
+"""Number of motions kept as Python numbers before they are converted to arrays."""
 
 
 class MotionBuilder:
-    """Gathers motions; `moves()` makes the columns of them.
+    """Collects motions; `moves()` returns them as columns.
 
-    rolls       (n_axes,) rotary axes that may roll over (see `turns`); None: none
-    winding     how they came to where they stand, where that matters
-    overturned  the block of the first motion so far that might lead one of them the other way round
-    brought_back  that of the first one that brings one of them back from beyond a full turn
+    rolls         (n_axes,) rotary axes that may roll over (see `turns`); None: none
+    winding       how far each of these axes has been turned before, where that matters
+    overturned    block of the first motion whose direction of rotation is in doubt (half a turn or more)
+    brought_back  block of the first motion that brings such an axis back from beyond a full turn
     """
 
     def __init__(self, axes: tuple[str, ...], rotary: frozenset[str]) -> None:
@@ -95,7 +97,7 @@ class MotionBuilder:
         self.clear()
 
     def clear(self) -> None:
-        """Forget the motions so far; styles, reasons, frames and calls keep their numbers."""
+        """Discard the motions collected so far; styles, reasons, frames and calls keep their indices."""
         self.count = 0
         self._buffer = Buffer()
         self._stretches: list[MotionColumns] = []
@@ -112,22 +114,22 @@ class MotionBuilder:
 
     @property
     def endless(self) -> int:
-        """The axes that may roll over, as bits."""
+        """The axes that may roll over, as a bit mask by letter."""
         return 0 if self.rolls is None else sum(1 << self.columns[place] for place in np.flatnonzero(self.rolls))
 
     # -- what is shared -----------------------------------------------------------------------------------------------
 
     def style(self, style: MotionStyle) -> int:
-        """The index of a style."""
+        """The index of `style`; a new style is added."""
         return self._styles.setdefault(style, len(self._styles))
 
     @property
     def styles(self) -> tuple[MotionStyle, ...]:
-        """The styles by their index."""
+        """All styles, in the order of their indices."""
         return tuple(self._styles)
 
     def reason(self, text: str) -> int:
-        """The index of a reason."""
+        """The index of the reason `text`; a new reason is added."""
         return self._reasons.setdefault(text, len(self._reasons))
 
     def frame(
@@ -138,7 +140,7 @@ class MotionBuilder:
         diameter: bool,
         increments: tuple[float, float] = (1.0, 1.0),
     ) -> int:
-        """The index of a frame; `offset` has one number per letter."""
+        """The index of a frame; a new frame is added. `offset` has one number per axis letter."""
         key = (tuple(offset[column] for column in self.columns), rotation, unit, diameter, increments)
         return self._frames.setdefault(key, len(self._frames))
 
@@ -147,7 +149,7 @@ class MotionBuilder:
     def add(
         self, block: int, programmed: int, style: int, feed: float, start: Vector, end: Vector, unplaced: int
     ) -> None:
-        """One motion; `unplaced`: axes that the program has not brought to where they stand."""
+        """Add one motion; `unplaced`: bit mask of the axes whose positions the program has not set."""
         buffer = self._buffer
         buffer.block.append(block)
         buffer.programmed.append(programmed)
@@ -161,59 +163,62 @@ class MotionBuilder:
             self._flush()
 
     def arc(self, arc: Arc) -> None:
-        """The circle of the motion that is added next."""
+        """Set the circle of the motion that will be added next."""
         self._arcs[self.count] = arc
 
     def circles(self, circles: Circles) -> None:
-        """The circles among the motions that are added next."""
+        """Set the circles of the motions that will be added next."""
         if len(circles.row):
             self._circles.append(circles._replace(row=circles.row + self.count))
 
     def approach(self, command: Vector) -> None:
-        """The command at the level R of the canned cycle that is added next."""
+        """Set the commanded position at level R of the canned cycle that will be added next."""
         self._approaches[self.count] = [command[column] for column in self.columns]
 
     def called(self, call: CycleCall) -> None:
-        """The call of the canned cycle that is added next."""
+        """Set the call of the canned cycle that will be added next."""
         self._called[self.count] = self._calls.setdefault(call, len(self._calls))
 
     def counted(self, axes: int) -> None:
-        """The motion that is added next has words that count from where it starts for these axes, and only these."""
+        """Mark `axes` (bits) as the only ones whose words in the motion added next are incremental."""
         self._counted[self.count] = axes
 
     def measures(self, axes: int) -> None:
-        """The motion that is added next has words for these axes that are computed from what has been measured."""
+        """Mark `axes` (bits) of the motion added next as having words computed from measured values."""
         if axes:
             self._measured[self.count] = axes
 
     def rests(self, axes: int) -> None:
-        """The motion that is added next must leave these axes where they stand, though it names some of them."""
+        """Mark `axes` (bits) that the motion added next must leave at rest, although it names some of them."""
         if axes:
             self._resting[self.count] = axes
 
     def many_rest(self, axes: Ints) -> None:
-        """As `rests`, of many motions that are added next, (n,)."""
+        """Like `rests`, for the n motions that will be added next: bit masks (n,)."""
         rows = np.flatnonzero(axes)
         self._resting |= dict(zip((self.count + rows).tolist(), axes[rows].tolist(), strict=True))
 
     def says_the_way(self, axes: int, motions: int = 1, first: int | None = None) -> None:
-        """Motions, those added next or from `first` on, turn axes in a way that words say, or nothing leaves open."""
+        """Mark `axes` (bits) whose direction of rotation is not in doubt, as when a word states it.
+
+        Applies to `motions` motions from index `first` on; None: from the motion that will be added next.
+        """
         begin = self.count if first is None else first
         self._directed.append((begin, begin + motions, axes))
 
     def extend(self, stretch: MotionColumns) -> None:
-        """Many motions."""
+        """Add a stretch of motions."""
         self._flush()
         self._stretches.append(stretch)
         self.count += len(stretch.block)
 
     @property
     def latest(self) -> MotionColumns | None:
-        """The motions that came together last; None if single ones came behind them, or none at all."""
+        """The stretch added last; None if single motions followed it, or if nothing was added."""
         return self._stretches[-1] if self._stretches and not self._buffer.block else None
 
     def latest_arc(self) -> tuple[int, Arc] | None:
-        """The last arc among the motions that came together last, and which of these it is."""
+        """The last arc of the latest stretch, with its row in that stretch; None if it has none."""
         begin = self.count - (0 if self.latest is None else len(self.latest.block))
         if not self._circles or self._circles[-1].row[-1] < begin:
             return None
@@ -229,7 +234,7 @@ class MotionBuilder:
     # -- the result ---------------------------------------------------------------------------------------------------
 
     def moves(self) -> Moves:
-        """All motions so far."""
+        """All motions so far, as columns."""
         self._flush()
         parts = self._stretches or [Buffer().stretch()]
         block, mask, unplaced, style, feed = (
@@ -282,7 +287,7 @@ class MotionBuilder:
         )
 
     def _style_columns(self, style: Ints) -> dict[str, NDArray[Any]]:
-        """The columns of what styles hold, one row per motion."""
+        """The columns of the fields of `MotionStyle`, one row per motion."""
         rows, columns = list(self._styles), dict[str, NDArray[Any]]()
         same = rows[style[0]] if len(style) and (style == style[0]).all() else None
         for index, name in enumerate(MotionStyle._fields):
@@ -302,9 +307,9 @@ class MotionBuilder:
         end: Array,
         block: Ints,
     ) -> Array | None:
-        """Motions in which an axis might roll over must not be split, nor their angles led to the other side.
+        """Mark motions in which an axis might roll over: they must not be split, nor their angles cross a half turn.
 
-        Returns the angles to which plain words lead these axes, see `Moves.angles`.
+        Returns the range of the angles to which absolute words lead these axes, see `Moves.angles`.
         """
         if self.rolls is None:
             return None
@@ -336,7 +341,7 @@ class MotionBuilder:
         return angles
 
     def _mask_column(self, masks: dict[int, int], otherwise: Mask) -> Mask | None:
-        """(n, n_axes) from bit masks of some motions, and what holds for the others (n,); None if there are none."""
+        """(n, n_axes) from bit masks of some motions; the others take `otherwise` (n,). None if no mask is set."""
         if not masks:
             return None
         column = np.repeat(otherwise[:, None], len(self.columns), axis=1)
@@ -357,13 +362,13 @@ class MotionBuilder:
 
 
 def _first(block: Ints, rows: Mask, known: int | None) -> int | None:
-    """The block of the first of these motions, if none is known from before."""
+    """The block of the first motion in `rows`, unless an earlier one is known already."""
     found = np.flatnonzero(rows)
     return int(block[found[0]]) if known is None and found.size else known
 
 
 def _sparse(values: Mapping[int, Any], count: int, otherwise: float, kind: type[np.generic]) -> NDArray[Any] | None:
-    """A column (count, ...) of what some rows have, and `otherwise` in the others; None if there are none."""
+    """A column (count, ...) with the values of some rows and `otherwise` elsewhere; None if no row has a value."""
     if not values:
         return None
     own = np.array(list(values.values()), dtype=kind)
@@ -373,7 +378,7 @@ def _sparse(values: Mapping[int, Any], count: int, otherwise: float, kind: type[
 
 
 def _joined_ends(parts: Sequence[MotionColumns], columns: list[int]) -> tuple[Array, Array]:
-    """Where the motions of stretches start and end; views of one path where all go on from each other, to the bit."""
+    """Start and end points of all stretches; views of one path if each motion starts where the previous one ended."""
     starts, ends = zip(*(part.ends(columns) for part in parts), strict=True)
     if len(parts) == 1:
         return starts[0], ends[0]
@@ -387,7 +392,7 @@ def _joined_ends(parts: Sequence[MotionColumns], columns: list[int]) -> tuple[Ar
 
 
 def _joined(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    """Columns one behind the other; a single one as it is."""
+    """Columns concatenated; a single column is returned unchanged."""
     return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
@@ -395,7 +400,7 @@ def _joined(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
 class MotionColumns:
     """Consecutive motions as columns; `programmed` and `unplaced` are bit masks by letter, `start` and `end` (n, 9).
 
-    path  (n + 1, 9) what both are views of, where each motion begins where the one before it ends
+    path  (n + 1, 9) the points of which `start` and `end` are views, if each motion starts where the previous one ends
     """
 
     block: Ints
@@ -408,7 +413,7 @@ class MotionColumns:
     path: Array | None = None
 
     def ends(self, columns: list[int]) -> tuple[Array, Array]:
-        """Where the motions start and end, by some of the letters; views of one path where they go on."""
+        """Start and end points in the given letter columns; views of one path if the motions are contiguous."""
         if self.path is None:
             start, end = (each.take(columns, axis=1, mode="clip") for each in (self.start, self.end))
             return start, end
@@ -418,7 +423,7 @@ class MotionColumns:
 
 @mutable
 class Buffer:
-    """Motions that came one by one."""
+    """Single motions, as Python lists."""
 
     block: list[int] = field(default_factory=list)
     programmed: list[int] = field(default_factory=list)

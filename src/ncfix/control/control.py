@@ -1,10 +1,10 @@
-"""The control while it follows a program: its motions, and what may be done to each of them.
+"""The state of a control while it follows a program, and what may be done with each motion.
 
-Contours: while the control offsets them (cutter radius compensation), it would offset the least way in the plane by the
-radius, in whatever direction it leads. So a motion that makes no way in the plane must make none when it is corrected:
-axes of the plane that it does not name get no word, and those that it names, as `X40` where X stands at 40, stay where
-they stand. At a corner that the control rounds or breaks it puts in nothing where a motion leaves the plane; so a
-motion that does not leave it must not do so when it is corrected.
+Cutter radius compensation: the control would offset even the smallest displacement in the plane by the radius, in
+whatever direction it points. So a motion without displacement in the plane must stay without one when it is corrected:
+axes of the plane that it does not name get no word, and axes that it names (`X40` where X stands at 40) stay where they
+are. At a corner that the control rounds or chamfers, it inserts nothing if a motion leaves the plane; so a motion that
+stays in the plane must stay in it when it is corrected.
 Source: Siemens, "SINUMERIK 840D sl, NC programming, fundamentals": chamfer, rounding (CHF, CHR, RND, RNDM).
 """
 
@@ -56,42 +56,43 @@ MOVED_AS_A_WHOLE = "NCF280"
 AS_A_WHOLE = "{} is corrected where it is called, down to its bottom; what it mills there is moved as a whole"
 
 UNPLACED = "the program has not said where the axis {} stands, and this motion would need a word for it"
-"""Why a motion is left as it is, or refused, that moves an axis without naming it."""
+"""Why a motion that moves an axis without naming it is passed or refused."""
 
 RIGHT = 42
-"""The control offsets the contour to the right of the way."""
+"""G42: cutter radius compensation to the right of the path."""
 NOT_ACCOUNTED = "nothing is known that the control would make of the word {} in this block"
 AFTER_THAT = "where the axis {{}} stands is not known after this: {}"
 FOLLOWED_IN_VAIN = 5000
-"""Blocks that are followed for what else is not given, once the program has moved an axis that the machine lacks."""
+"""Blocks followed after the program has moved an axis that the machine lacks, to collect further missing data."""
 ASTRAY = "where the axis {} stands after motions that were not followed is not known"
 NO_UNIT = "NCF215"
 NO_UNIT_SAID = "the program does not say whether it is in inches or millimetres, and is taken as millimetres"
 NO_WAY = 1e-9
-"""mm"""
+"""Largest displacement, mm or rad, of an axis that is taken to stand still."""
 ALONG = 1 - 1e-12
-"""A component of a turned axis that is no less lies along the axis itself."""
+"""A turned axis whose component along the machine axis is at least this counts as parallel to it."""
 
 
 class ProgramControl(ControlState):
-    """What every control keeps while it follows a program, whatever its language; its motions go to `builder`.
+    """State that every control keeps while it follows a program, in any language; motions are added to `builder`.
 
-    budget     how much may still be executed
-    needs_feed a motion at feed is an error where no feed is set
-    refusal    why every motion from here on is refused; empty while all is well
-    suspended  the same, for as long as a code is in force: what suspends them -> why
-    followed   those of `suspended` under which it is known all the same where motions lead
-    astray     the axes that motions have led elsewhere than is known while they were suspended, as bits
-    foreign    the axes that the program moves and the machine lacks
-    external   the subprogram file that is executed; empty in the program itself
-    row_block  the block of the program to which motions belong: in a subprogram file the one that has called
-    numbers, first  the numbers of the text that is executed, and where those of the block begin
-    ends       where the motions of a block end, if somebody wants to know
-    points     a block gave the direction of the tool as a vector
-    whole      the motions of the block must not be split, as under cutter compensation
-    at_corner  the motion begins or ends at a corner that the control rounds or breaks
-    beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
-    block_words  the addresses of the block that is executed, as long as it has made no motion and no setting took them
+    budget     number of blocks that may still be executed
+    needs_feed whether a feed motion without a feed is an error
+    refusal    why all further motions are refused; empty while they are not
+    suspended  modes during which motions are refused -> why
+    followed   modes of `suspended` in which the end positions of motions are known nevertheless
+    astray     axes, as bits, that moved to unknown positions in suspended modes
+    foreign    axes that the program moves and the machine lacks
+    external   name of the subprogram file being executed; empty in the main program
+    row_block  main program block to which motions belong: for motions of a subprogram file, the calling block
+    numbers, first  numbers of the text being executed, and index of the first number of the block
+    ends       collects the end points of a block's motions; None: not wanted
+    points     whether a block gave the tool direction as a vector
+    whole      whether the motions of the block must not be split
+    at_corner  whether the motion begins or ends at a corner that the control rounds or chamfers
+    beside     axes, as bits, still offset from a contour after its compensation ended: the motion that leads off is not
+               split
+    block_words  addresses of the block being executed that no motion or setting has used yet
     """
 
     unit_codes = "G20 or G21"
@@ -118,34 +119,34 @@ class ProgramControl(ControlState):
         self.block_words: Collection[str] = ()
 
     def lasting(self) -> str | None:
-        """All that the control keeps, but for what a `Checkpoint` says, so that it can be compared; None: not said."""
+        """The whole state except what a `Checkpoint` holds, in comparable form; None: not available."""
         return None
 
     def set_variables(self) -> Any:
-        """The variables that the program may have set, to go from one process to another."""
+        """The variables that the program may have set, in a form that can be sent to another process."""
         return None
 
     def take_variables(self, variables: Any) -> None:
-        """Go on with variables that another process has handed on."""
+        """Restore variables that another process obtained by `set_variables`."""
 
     @property
     def lacking(self) -> tuple[Message, ...]:
-        """What the program used so far and the setup does not give, and axes that the machine lacks."""
+        """Errors for data that the program used and the setup does not give, and for axes that the machine lacks."""
         return (*self.foreign.values(), *self.knowledge.missing.values())
 
     @property
     def closure_mm(self) -> float:
-        """By how much the radii at both ends of an arc may differ, mm."""
+        """Largest difference, mm, between the radii at both ends of an arc."""
         return self.dialect.closure_mm
 
     @property
     def turns_in_plane(self) -> bool:
-        """Whether the tool turns in the plane of the directions at both ends of a cut, and its axes not evenly."""
+        """Whether the tool turns in the plane of its two end directions, instead of each rotary axis evenly."""
         return False
 
     @property
     def takes_zero_across(self) -> bool:
-        """Whether an arc may have a centre word across its plane, a zero (I, J and K in all of them)."""
+        """Whether an arc may have a centre word of value zero for the axis across its plane (I, J and K together)."""
         return True
 
     def moves(self) -> Moves:
@@ -154,9 +155,10 @@ class ProgramControl(ControlState):
         return replace(moves, pointing=self.posture.pointing) if self.points else moves
 
     def refuse_after(self, code: int, *, moving: bool) -> None:
-        """A G code (tenths) is not known: it may move or change coordinates. The setup may say that it does not.
+        """Refuse all motions after an unknown G code (tenths), unless the setup says that it is harmless.
 
-        moving  its block has words of axes or of a length: whether the code takes them, nobody has said
+        moving  whether its block has words of axes or of a length, which the code might use: then it is refused
+                nevertheless
         """
         passed = code in self.setup.passed_codes
         if self.refusal or (passed and not moving):
@@ -166,24 +168,24 @@ class ProgramControl(ControlState):
         self.warn("NCF228", self.refusal, TAKEN if passed else NEITHER.format(name))
 
     def refuse_rest(self, why: str) -> None:
-        """Every motion from here on is refused; the first reason is the one that is told."""
+        """Refuse every further motion; the first reason given is the one reported."""
         self.refusal = self.refusal or why
 
     def take_length(self, number: int) -> None:
-        """The length of a tool acts from here on, see `SetLength`; for languages that take codes of a plugin's."""
+        """Apply the length of tool `number` from here on (`SetLength`); for languages that accept plugin codes."""
         raise NotImplementedError
 
     def moved_as_a_whole(self, cycle: str) -> None:
-        """Say of a cycle with a path of its own that only its place and bottom are corrected."""
+        """Report that of a cycle with a path of its own only the place and the bottom are corrected."""
         self.warn(MOVED_AS_A_WHOLE, AS_A_WHOLE.format(cycle))
 
     def suspend(self, mode: str, why: str, *, followed: bool = False) -> None:
-        """Motions are refused until `resume` of the same mode; `followed`: where they lead is known all the same."""
+        """Refuse motions until `resume(mode)`; `followed`: their end positions are known nevertheless."""
         self.suspended[mode] = why
         (self.followed.add if followed else self.followed.discard)(mode)
 
     def resume(self, mode: str) -> bool:
-        """A mode that suspended motions is over; whether it was in force. Where it has led axes is not known."""
+        """End a suspended mode; returns whether it was in force. Axes that it led astray become unknown."""
         over = self.suspended.pop(mode, None) is not None
         if over and self.astray:
             self.lose([index for index in self.axis_indices if self.astray >> index & 1], ASTRAY)
@@ -192,16 +194,16 @@ class ProgramControl(ControlState):
 
     @property
     def remarks(self) -> tuple[Message, ...]:
-        """All that there is to say of the program, in the same order whether it was followed in parts or as a whole."""
+        """All remarks on the program, in an order that does not depend on whether it was followed in parts."""
         rolled = (self.rolled[text] for text in ROLLED if text in self.rolled)
         return (*self.knowledge.assumed.values(), *self.messages.values(), *rolled)
 
     def watch_rolling(self) -> None:
-        """Have motions watched in which an axis might roll over: one that goes a full turn or more, as far as known."""
+        """Watch for motions in which a rotary axis might roll over, as far as its known travel allows it."""
         self.builder.rolls = may_roll(None if self.kinematics is None else self.kinematics.travel, self.builder.rotary)
 
     def note_rolling(self, program: Program) -> None:
-        """Say where the first motions are in which an axis might roll over, of each kind."""
+        """Report the first motion of each kind in which an axis might roll over."""
         for text, block in zip(ROLLED, (self.builder.overturned, self.builder.brought_back), strict=True):
             if block is not None and text not in self.rolled:
                 self.rolled[text] = Message(ROLLS, text, program.place(block), ROLLED[text])
@@ -209,20 +211,21 @@ class ProgramControl(ControlState):
     # -- blocks -------------------------------------------------------------------------------------------------------
 
     def enter_block(self, words: Collection[str]) -> None:
-        """A block is executed that has words of these addresses."""
+        """Begin a block that has words of these addresses."""
         self.block_words = words
 
     def claim_words(self, words: Collection[str] | None = None) -> None:
-        """A setting of the block takes these of its words for itself, or all of them: they lead nowhere."""
+        """Mark words of the block (None: all) as used by a setting, so that they demand no motion."""
         self.block_words = () if words is None else [word for word in self.block_words if word not in words]
 
     def leave_block(self) -> None:
-        """The block is over. If it has a word that leads somewhere, and has made no motion, it is refused.
+        """End a block. If it has an unused path word and has made no motion, it is refused.
 
-        That is the one rule for all languages: no such word is ever passed over. Interpreters call this behind every
-        block; what goes through a lane makes motions only.
+        This one rule holds for all languages: a path word is never ignored. Interpreters call it after every block;
+        blocks of the fast lane contain only motions.
 
-        Raises UsageError with all that is lacking, soon after the program has moved an axis that the machine lacks.
+        Raises UsageError with everything in `lacking`, some blocks after the program moved an axis that the machine
+        lacks.
         """
         if self.foreign:
             self.followed_in_vain += 1
@@ -235,16 +238,16 @@ class ProgramControl(ControlState):
 
     @abstractmethod
     def path_word(self, words: Collection[str]) -> str:
-        """The first of a block's words that leads somewhere in the modes in force; empty if none does."""
+        """The first word that demands a motion in the modes in force; empty if there is none."""
 
     def refuse_here(self, reason: str) -> None:
-        """A block of which it is not known where it leads: none of the axes is known afterwards."""
+        """Refuse a block whose motion is not known: the positions of all axes are unknown afterwards."""
         unknown = dict.fromkeys(self.axis_indices, AFTER_THAT.format(reason))
         self.make(Motion(MotionKind.FEED, 0, MotionEnd(self.position[:], unknown), 10, refusal=reason))
 
     @property
     def frame(self) -> int:
-        """The index of the frame that is in force."""
+        """The index of the frame in force."""
         if self._frame < 0:
             self._frame = self.builder.frame(
                 self.offset, self.rotation, self.stretch, self.modal.diameter, self.increments
@@ -252,7 +255,10 @@ class ProgramControl(ControlState):
         return self._frame
 
     def make(self, motion: Motion) -> None:
-        """Make a motion, and keep the book of what is known behind it. All motions that come singly come by here."""
+        """Add a motion, and update positions and what is known of them.
+
+        Every motion passes through here, except those of the fast lane.
+        """
         if not motion.passing:
             self._ask_for_start(motion)
             if not self.unit_said:
@@ -288,7 +294,7 @@ class ProgramControl(ControlState):
         self.position, self.unknown = fate.end.target, fate.end.unknown
 
     def _ask_for_start(self, motion: Motion) -> None:
-        """Settle start positions that matter: where the motion ends, and for all but rapids where it begins."""
+        """Resolve start positions that matter: at the end of a rapid, at both ends of other motions."""
         kind, unknown = motion.kind, motion.end.unknown
         if AT_START in unknown.values() or (kind != MotionKind.RAPID and AT_START in self.unknown.values()):
             everywhere = tuple(self.unknown) if kind != MotionKind.RAPID else tuple(unknown)
@@ -300,18 +306,18 @@ class ProgramControl(ControlState):
                     del unknown[index]
 
     def _moved_by(self, motion: Motion) -> int:
-        """The axes that a motion names or moves, as bits."""
+        """The axes that a motion names or moves, as a bit mask."""
         target, here = motion.end.target, self.position
         return mask_of(i for i in self.axis_indices if motion.axes >> i & 1 or target[i] != here[i])
 
     def placed_by(self, motion: Motion) -> int:
-        """The axes whose words say where they stand behind the motion."""
+        """The axes whose positions at the end of the motion are set by its words, as a bit mask."""
         if motion.placed is not None:
             return motion.placed
         return 0 if motion.passing or self.modal.incremental else motion.axes
 
     def _keep_places(self, motion: Motion, placed: int) -> None:
-        """What the program has said of where the axes stand; a motion that is passed may lead elsewhere."""
+        """Update which axes the program has placed; a motion passed by rule may end somewhere else."""
         if motion.passing and motion.kind != MotionKind.DWELL:
             self.places.lose(self._moved_by(motion))
         lost = self._lost_at_end(motion)
@@ -322,19 +328,19 @@ class ProgramControl(ControlState):
         self.places.begun = True
 
     def _lost_at_end(self, motion: Motion) -> UnknownAxes:
-        """What is not known at the end of a motion, along the axes of the program's frame."""
+        """Reasons why coordinates are unknown at the end of a motion, by axis of the program's frame."""
         if motion.end.in_frame is not None:
             return self.without_start(motion.end.in_frame)
         return self.lost_in_frame() if motion.kind == MotionKind.DWELL else self.along_frame(motion.end.unknown)
 
     def ends_in_hole(self, motion: Motion) -> bool:
-        """Whether there is a hole where the motion ends: then it matters where that is, as in a cut."""
+        """Whether the motion ends in a hole: then its end position matters as in a cut."""
         return motion.kind == MotionKind.CYCLE
 
     def _fate(self, motion: Motion, unplaced: int) -> Motion:
-        """The motion as it will be judged: rapids pass that need words for axes of which nobody has said enough.
+        """The motion, passed or refused if it depends on axes whose positions the program has not set.
 
-        If it moves an axis that has no word and must get none, a rapid passes, others are refused.
+        If it moves an axis that has no word and must get none, a rapid is passed and any other motion refused.
         """
         if motion.passing is None and self._leaves_unknown(motion) and not self.ends_in_hole(motion):
             return motion._replace(passing=Passing(Pass.UNSAID, first_reason(motion.end.unknown)))
@@ -353,10 +359,10 @@ class ProgramControl(ControlState):
         return motion._replace(refusal=why)
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
-        """Whether a motion is a rapid that says nothing of axes that are not known at its end, and were not before.
+        """Whether the motion is a rapid that leaves axes unknown that were unknown before, and names none of them.
 
-        Where they stand, its correction would depend on. It cuts nothing, and the axes that it names can be corrected
-        as soon as the program has named the others: it passes.
+        Its correction would depend on their positions. A rapid cuts nothing, and its axes can be corrected once the
+        program has named the others: it is passed.
         """
         if not rapid.end.unknown or rapid.kind != MotionKind.RAPID or rapid.refusal or self.refusal or self.suspended:
             return False
@@ -365,14 +371,15 @@ class ProgramControl(ControlState):
         return before.issuperset(rapid.end.unknown.values()) and not named
 
     def still_beside(self, axes: int) -> int:
-        """Axes of the plane that get no word in a motion across it."""
+        """The axes of the plane, as bits, that get no word in a motion across it under radius compensation."""
         plane = self.plane_axes if self.modal.compensated else 0
         return 0 if axes & plane else plane
 
     def _resting(self, motion: Motion) -> int:
-        """Axes that must stay where they stand in a motion.
+        """Axes, as bits, that must stay at rest in a motion.
 
-        Those of the plane, if it names some of them without any way in it; at a corner all others that make no way.
+        Those of the plane, if it names some of them without displacement in the plane; at a corner also all other axes
+        without displacement.
         """
         plane = self.plane_axes
         beside = motion.arc is None and bool(self.modal.compensated and motion.axes & plane)
@@ -386,25 +393,25 @@ class ProgramControl(ControlState):
         return across | (plane if beside and plane & ~still == 0 else 0)
 
     def resting_of_many(self, words: Ints, starts: Array, ends: Array) -> Ints:
-        """As `_resting`, of motions with `words` (n,) from `starts` to `ends` (n, 9), in coordinates not turned."""
+        """Like `_resting`, for motions with `words` (n,) from `starts` to `ends` (n, 9); not in a rotated frame."""
         columns = list(self.modal.plane.pair)
         still = (np.abs(ends[:, columns] - starts[:, columns]) <= NO_WAY).all(axis=1)
         return np.where(still & (words & self.plane_axes != 0), self.plane_axes, 0)
 
     def end_compensation(self) -> None:
-        """Where the axes of the plane stand after the contour the control knows, until they are named."""
+        """End radius compensation: until the program names the axes of the plane, only the control knows them."""
         if self.modal.compensated:
             self.beside = self.plane_axes
             self.places.lose(self.beside)
         self.modal.compensated = 0
 
     def _turned(self) -> int:
-        """Axes that are moved by words of others, since the frame is turned."""
+        """Axes, as bits, that words of other axes move too, because the frame is rotated."""
         return mask_of(i for i, row in enumerate(self.rotation) if i in self.axis_indices and abs(row[i]) < ALONG)
 
     @contextmanager
     def in_one_piece(self) -> Iterator[None]:
-        """The motions that are made meanwhile must not be split."""
+        """Context in which motions must not be split."""
         whole, self.whole = self.whole, True
         try:
             yield
@@ -412,7 +419,7 @@ class ProgramControl(ControlState):
             self.whole = whole
 
     def _style_of(self, motion: Motion) -> int:
-        """The style of a motion; one that leads off a contour stays whole, and one in which the tool would stray."""
+        """The style of a motion; it stays whole if it leads off a contour, or if splitting would turn the tool."""
         passing, whole = motion.passing, self.whole
         self.whole = whole or bool(self.beside & motion.axes) or self._strays(motion)
         if passing is not None and motion.kind in PASS_RULES[passing.rule].kinds:
@@ -424,7 +431,7 @@ class ProgramControl(ControlState):
         return style
 
     def _strays(self, motion: Motion) -> bool:
-        """Whether axes that turn evenly, as in pieces of the motion, would lead the tool out of its plane."""
+        """Whether evenly turning rotary axes, as in pieces of the motion, would lead the tool axis out of its plane."""
         pointing = self.posture.pointing if self.turns_in_plane and motion.kind != MotionKind.RAPID else None
         if pointing is None:
             return False
@@ -433,11 +440,11 @@ class ProgramControl(ControlState):
         return pointing.stray(here, there) > FAR
 
     def style_of(self, kind: MotionKind, code: int, unknown: UnknownAxes | None = None, refusal: str = "") -> int:
-        """The style of a motion that does not pass: corrected, or refused where there is a reason.
+        """The style of a motion that is corrected, or refused if there is a reason.
 
-        A canned cycle begins with a rapid, so it does not matter where from.
+        The start of a rapid or a canned cycle does not matter, since a cycle begins with a rapid.
 
-        unknown, refusal  as in `Motion`; of many motions at once, nothing
+        unknown, refusal  as in `Motion`; not given for stretches of motions
         """
         reason = refusal or self.refusal or next(iter(self.suspended.values()), "")
         if not reason and self.tools.unsure and self.tools.offset is None:
@@ -451,7 +458,7 @@ class ProgramControl(ControlState):
         return self._style(kind, Rule.REFUSE if reason else Rule.CORRECT, reason, code)
 
     def note_foreign(self, letter: str, also: str = "") -> None:
-        """The program moves an axis that the machine lacks; `also`: what else it may mean."""
+        """Record that the program moves an axis that the machine lacks; `also`: another meaning, for the hint."""
         names = " ".join(self.builder.axes)
         text = f"the program moves the axis {letter}, and the machine has only {names}"
         self.foreign[letter] = Message(UNKNOWN_AXIS, text, self.place(), f"is it the right machine file?{also}")
@@ -483,9 +490,9 @@ class ProgramControl(ControlState):
         )
 
     def _beside(self) -> float:
-        """By how much the control offsets the contour to the left of the way, mm; NaN where it is not known.
+        """Offset of the compensated contour to the left of the path, mm; NaN if the tool radius is not known.
 
-        Where the program's coordinates are mirrored, left of its way is right of that of the tool.
+        In mirrored coordinates, left of the programmed path is right of the tool's path.
         """
         radius = self.tool_radius() if self.modal.compensated else 0.0
         if math.isnan(radius):

@@ -1,11 +1,10 @@
-"""The axis letters of all languages, how their words become millimetres and radians, rotations of X Y Z, and which
-axes the program itself has brought to where they stand.
+"""Axis letters common to all languages, rotations of X Y Z, and the axes whose positions the program itself has set.
 
-A correction may want a word for an axis that its block does not name. Such a word says where the axis stands already,
-but for some um, and that must be the program's own knowledge: if it rests on what tables or people say of the start,
-of work offsets or of tool lengths, and they are wrong, the word makes the axis move there, perhaps into the part.
-So an axis is unplaced until an absolute word of the program brings it to its place, and again after whatever takes it
-elsewhere or makes another table count: machine coordinates, reference points, probing, a change of tool, of its
+A correction may need a word for an axis that its block does not name. Such a word repeats the axis position, changed by
+a few um, so that position must come from the program itself. If it came from a start position, work offset or tool
+length that someone entered, and that value were wrong, the word would move the axis there, perhaps into the part.
+So an axis is unplaced until an absolute word of the program positions it. It becomes unplaced again after anything that
+moves it otherwise or changes its reference: machine coordinates, reference points, probing, a change of tool, of its
 length offset, or of the work offset.
 """
 
@@ -19,7 +18,7 @@ from typing import TypeVar
 from ncfix.values import frozen, mutable
 
 LETTERS = "XYZABCUVW"
-"""The axis letters of RS274NGC in the order of its parameters; every position here is a list in this order."""
+"""Axis letters of RS274NGC, in the order of its parameters; position vectors have this order."""
 
 INDEX = {letter: index for index, letter in enumerate(LETTERS)}
 N_LETTERS = len(LETTERS)
@@ -31,7 +30,7 @@ INCH = 25.4
 
 Vector = list[float]
 Rotation = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
-"""Rows of a 3 x 3 matrix that acts on X Y Z."""
+"""Rows of a 3 x 3 matrix acting on X Y Z."""
 
 IDENTITY: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 T = TypeVar("T")
@@ -39,7 +38,7 @@ T = TypeVar("T")
 
 @frozen
 class Plane:
-    """A plane of arcs and cycles: its two axes in right-handed order, and the one across it."""
+    """A plane of arcs and cycles: its two axes in right-handed order, and the axis normal to it (`across`)."""
 
     code: int
     first: int
@@ -57,7 +56,7 @@ class Plane:
         return self.first, self.second
 
     def of(self, values: Sequence[T]) -> tuple[T, T]:
-        """The values of its two axes, of those of all axes."""
+        """The two values of this plane's axes, from one value per axis."""
         return values[self.first], values[self.second]
 
 
@@ -76,12 +75,12 @@ CENTRE_LETTERS = "IJK"
 
 
 def zeros() -> Vector:
-    """A position at zero."""
+    """A position vector of zeros."""
     return [0.0] * N_LETTERS
 
 
 def about(plane: Plane, degrees: float) -> Rotation:
-    """The right-handed rotation in a plane of X Y Z. Exact for multiples of a right angle."""
+    """Right-handed rotation in a plane of X Y Z by an angle in degrees; exact for multiples of 90."""
     turn = degrees % 360.0
     exact = {0.0: (1.0, 0.0), 90.0: (0.0, 1.0), 180.0: (-1.0, 0.0), 270.0: (0.0, -1.0)}
     cosine, sine = exact.get(turn) or (math.cos(degrees * DEGREE), math.sin(degrees * DEGREE))
@@ -93,7 +92,7 @@ def about(plane: Plane, degrees: float) -> Rotation:
 
 
 def as_rotation(rows: Sequence[Sequence[float]]) -> Rotation:
-    """Three rows of three as a rotation."""
+    """A `Rotation` from three rows of three numbers."""
     (a, b, c), (d, e, f), (g, h, i) = rows
     return (a, b, c), (d, e, f), (g, h, i)
 
@@ -115,7 +114,7 @@ def dot(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def rotated(rotation: Rotation, vector: Vector) -> Vector:
-    """A position with its X Y Z rotated."""
+    """The position with its X Y Z rotated; the other axes unchanged."""
     return [dot(row, vector) for row in rotation] + vector[3:]
 
 
@@ -126,12 +125,12 @@ def angles_in_words(indices: Iterable[int], angles: Iterable[float]) -> str:
 
 @mutable
 class Places:
-    """The book of it; axes are bits of a mask, by letter.
+    """Which axes the program has placed (see the module); axes are bits of a mask, by letter.
 
-    unplaced   axes that the program has not brought to where they stand
-    anchors  for each letter what its numbers count from, besides what the program states in numbers itself
-    rotation how X Y Z of the program are turned: its rows, for comparison only
-    begun    there has been a motion
+    unplaced  axes whose positions the program has not set
+    anchors   for each letter, the references of its numbers other than numbers stated in the program
+    rotation  rotation of the program's X Y Z, by rows; only compared
+    begun     whether there has been a motion
     """
 
     unplaced: int
@@ -140,9 +139,9 @@ class Places:
     begun: bool = False
 
     def watch(self, anchors: Sequence[Hashable], rotation: Sequence[Hashable]) -> None:
-        """What numbers count from now; an axis for which that has changed since the first motion is unplaced.
+        """Record what numbers now refer to; an axis whose reference changed since the first motion becomes unplaced.
 
-        Of axes that the program turns (G68, ROT) each is made of all: they are unplaced together.
+        The axes of a rotated frame (G68, ROT) depend on each other and become unplaced together.
         """
         if self.begun:
             self.unplaced |= changed(self.anchors, anchors)
@@ -151,27 +150,27 @@ class Places:
         self.anchors, self.rotation = anchors, rotation
 
     def lose(self, axes: int) -> None:
-        """Something else than a word of the program has moved these axes, or may have."""
+        """Mark axes as unplaced: something other than a word of the program has moved them, or may have."""
         self.unplaced |= axes
 
     def shift(self, axes: int) -> None:
-        """What the numbers of these axes count from is put anew, perhaps to other values than it really had.
+        """Mark axes as unplaced because their reference was set anew, perhaps to a value other than the real one.
 
-        Before the first motion nothing has been brought anywhere.
+        Has no effect before the first motion.
         """
         if self.begun:
             self.unplaced |= axes
 
     def place(self, axes: int) -> None:
-        """The program says where these axes stand."""
+        """Mark axes as placed by the program."""
         self.unplaced &= ~axes
 
 
 def changed(before: Sequence[Hashable], now: Sequence[Hashable]) -> int:
-    """The places at which two sequences differ, as a bit mask."""
+    """Indices at which two sequences differ, as a bit mask."""
     return mask_of(index for index, (a, b) in enumerate(zip(before, now, strict=True)) if a != b)
 
 
 def mask_of(indices: Iterable[int]) -> int:
-    """Letter indices as a bit mask."""
+    """Bit mask of letter indices."""
     return sum(1 << index for index in indices)

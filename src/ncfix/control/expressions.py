@@ -1,12 +1,12 @@
-"""Expressions of a block made into functions, once per shape, and the values that they give: one evaluator for all
-languages.
+"""Evaluation of the expressions in blocks: one evaluator for all languages.
 
-A function reads the numbers of the block that is executed from a `Scope` and gives a `Value`: a number, a text, or
-`Unknown`, which nobody knows before the machine runs (a probed position, an input, a variable that an earlier program
-has left). What is computed from it is unknown, too, for the same reason. What operators and functions a language has,
-and what it counts as a number, is in its own `Expressions`. Angles are degrees.
+Each expression is compiled once per block shape to a function. The function reads the numbers of the block being
+executed from a `Scope` and returns a `Value`: a number, a text, or `Unknown` for what is not known before the machine
+runs (a probed position, an input, a variable left by an earlier program). A result computed from an unknown value is
+unknown for the same reason. Each language defines its operators, functions and number rules in its own `Expressions`.
+Angles are in degrees.
 
-What stops the control is a `Fault`: raised where it is found, it gets its place in the file on its way out.
+`Fault` is raised for what stops the control; its place in the file is added while it propagates.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from ncfix.text.tree import (
 
 
 class Fault(Exception):  # noqa: N818 - a fault of the program that is followed, not of ncfix
-    """The control would stop here, or cannot be followed further.
+    """An error in the program being followed: the control would stop here, or ncfix cannot follow further.
 
     code  the coded error
-    text  what is the matter, plain words
+    text  what is wrong, in plain words
     hint  what to do about it
-    span  where in the block, None for the whole block
+    span  place in the block; None for the whole block
     """
 
     def __init__(self, code: str, text: str, hint: str = "", span: Span | None = None) -> None:
@@ -47,7 +47,7 @@ class Fault(Exception):  # noqa: N818 - a fault of the program that is followed,
         self.span = span
 
     def at(self, span: Span | None) -> Fault:
-        """This fault at a place in the block, if it has none yet."""
+        """This fault with a place in the block, unless it has one already."""
         if self.span is None:
             self.span = span
         return self
@@ -59,8 +59,8 @@ ARITHMETIC = "NCF210"
 class Unknown(NamedTuple):
     """A value that is known only at run time.
 
-    why      what it depends on, as it is said to people: the name of a variable; empty where there is nothing to say
-    nominal  what a dry run would give
+    why      what it depends on, for messages: the name of a variable; empty if there is nothing to tell
+    nominal  the value in a dry run
     """
 
     why: str = ""
@@ -68,34 +68,34 @@ class Unknown(NamedTuple):
 
 
 Value = float | str | Unknown
-"""A number (also for true and false), a text, or what is known only at run time."""
+"""A number (also true and false), a text, or a value known only at run time."""
 
 
 class Scope(Protocol):
-    """What an expression may refer to; each language adds its variables."""
+    """What an expression can read; each language adds its variables."""
 
     @property
     def numbers(self) -> Sequence[float]:
-        """The numbers of the program that is executed."""
+        """The numbers of the text being executed."""
 
     @property
     def first(self) -> int:
-        """Where those of the block begin."""
+        """Index of the first number of the block."""
 
 
 Evaluate = Callable[[Any], Value]
-"""Gives the value of an expression in a `Scope` of its language; raises `Fault` where the control would stop."""
+"""Computes the value of an expression in a `Scope` of its language; raises `Fault` where the control would stop."""
 
 
 class Expressions:
-    """How a language computes.
+    """The arithmetic of a language.
 
     operators   operator -> function of its two operands
-    functions   name or sign -> function, and how many arguments it takes
-    impossible  what is said of a result that is no finite number; `{}` stands for the operator or function
+    functions   name or sign -> function, and its number of arguments
+    impossible  message for a result that is not a finite number; `{}` stands for the operator or function
 
-    Functions raise `Fault`, ValueError or ArithmeticError where there is no result. Where an operand is unknown, there
-    is never a fault: the result is unknown, and nominally 0.
+    Functions raise `Fault`, ValueError or ArithmeticError if there is no result. With an unknown operand no fault is
+    raised: the result is unknown, with nominal value 0.
     """
 
     operators: ClassVar[Mapping[str, Callable[[float, float], float]]] = {}
@@ -103,7 +103,7 @@ class Expressions:
     impossible = "the result of {} is not a finite number"
 
     def compiled(self, expression: Expression, address: str = "") -> Evaluate:
-        """The function that computes an expression, which stands behind `address` if that is given."""
+        """The function that computes an expression; `address`: the address it stands behind, if any."""
         match expression:
             case Literal(slot):
                 return lambda scope: scope.numbers[scope.first + slot]
@@ -127,43 +127,43 @@ class Expressions:
         raise self.none_such(expression)
 
     def none_such(self, expression: object) -> AssertionError:
-        """The grammar of the language has no such expression."""
+        """The error for an expression that the grammar of the language does not have."""
         return AssertionError(f"{type(self).__name__}: the grammar has no {expression!r}")
 
     # -- what a language has of its own -------------------------------------------------------------------------------
 
     def operand(self, value: float) -> float:
-        """What a number counts as in arithmetic."""
+        """The value as which a number enters arithmetic."""
         return value
 
     def in_doubt(self, operator: str, left: float, right: float) -> bool:
-        """Whether a comparison comes out otherwise on other controls, or by rounding: then it is unknown."""
+        """Whether a comparison depends on the control or on rounding; its result is unknown then."""
         return False
 
     def text(self, text: str) -> Evaluate:
-        """A text."""
+        """The function for a text."""
         return lambda scope: text
 
     def numbered(self, index: Evaluate) -> Evaluate:
-        """A variable that is called by its number."""
+        """The function for a variable read by its number."""
         raise self.none_such(index)
 
     def named(self, name: str) -> Evaluate:
-        """A variable that is called by its name."""
+        """The function for a variable read by its name."""
         raise self.none_such(name)
 
     def element(self, name: str, index: tuple[Evaluate, ...]) -> Evaluate:
-        """An element of an array."""
+        """The function for an element of an array."""
         raise self.none_such(name)
 
     def existence(self, parameter: NumberedParameter | NamedParameter) -> Evaluate:
-        """Whether a variable has been defined."""
+        """The function that tells whether a variable has been defined."""
         raise self.none_such(parameter)
 
     # -- operators and functions --------------------------------------------------------------------------------------
 
     def function(self, name: str, arguments: tuple[Evaluate, ...], address: str = "") -> Evaluate:
-        """A sign or a function, with functions that give its arguments."""
+        """The function for a sign or a function call; `arguments` compute its arguments."""
         function, count = self.functions[name]
         if len(arguments) != count:
             text = f"{name.upper()} takes {count} argument{'s' if count > 1 else ''}"
@@ -175,7 +175,7 @@ class Expressions:
         return lambda scope: self.applied(name, function, *[argument(scope) for argument in arguments])
 
     def operator(self, operator: str, left: Expression, right: Expression, address: str = "") -> Evaluate:
-        """An operator between two operands, or a function of two."""
+        """The function for an operator with two operands."""
         function = self.operators[operator]
         first, second = self.compiled(left, address), self.compiled(right, address)
 
@@ -189,7 +189,7 @@ class Expressions:
         return evaluate
 
     def applied(self, name: str, function: Callable[..., float], *values: Value) -> Value:
-        """A function of values; a text is no number, and what comes of it is unknown."""
+        """The result of `function`; unknown if an argument is unknown, or is a text, which is no number."""
         unknown = next((value for value in reversed(values) if isinstance(value, Unknown | str)), None)
         try:
             result = float(function(*(self.operand(nominal(value)) for value in values)))
@@ -207,7 +207,7 @@ class Expressions:
 
 
 def left_out(scope: Scope) -> Value:
-    """An argument that is left out, or what nobody can know: unknown."""
+    """Value of an omitted argument, or of anything that cannot be known: unknown."""
     return Unknown()
 
 
@@ -284,7 +284,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {
     "sqrt": (square_root, 1),
     "tan": (lambda a: math.tan(math.radians(a)), 1),
 }
-"""Signs, and the functions of one argument that most languages have."""
+"""Signs, and the one-argument functions common to most languages."""
 
 SUMS: dict[str, Callable[[float, float], float]] = {
     "+": lambda a, b: a + b,
@@ -296,19 +296,19 @@ SUMS: dict[str, Callable[[float, float], float]] = {
 
 
 def nominal(value: Value) -> float:
-    """A value as a dry run has it: a number as it is, what is unknown by its nominal value; 0 for a text."""
+    """The value in a dry run: a number itself, the nominal value of an unknown, 0 for a text."""
     if isinstance(value, Unknown):
         return value.nominal
     return 0.0 if isinstance(value, str) else value
 
 
 def number(value: Value) -> float | None:
-    """A value as a number; None for a text, and where it is not known."""
+    """The value as a number; None for a text or an unknown value."""
     return None if isinstance(value, Unknown | str) else value
 
 
 def numbers(values: Iterable[Value]) -> list[float] | None:
-    """Values as numbers; None where one of them is a text or not known."""
+    """The values as numbers; None if one is a text or unknown."""
     found: list[float] = []
     for value in values:
         if isinstance(value, Unknown | str):
@@ -318,5 +318,5 @@ def numbers(values: Iterable[Value]) -> list[float] | None:
 
 
 def scaled(factor: float, value: Value) -> Value:
-    """A value times a number."""
+    """A value multiplied by a number."""
     return Unknown(value.why, factor * value.nominal) if isinstance(value, Unknown) else factor * nominal(value)

@@ -1,8 +1,8 @@
-"""A program made flat: every block that the control executes written out once, in order, with numbers for expressions.
+"""Flat programs: every block that the control executes written out once, in order, with numbers instead of expressions.
 
-A block that is executed from several states (in a loop, a subprogram, a repeated cycle) can be corrected for one of
-them only. In the flat program each execution is a block of its own. It is written while the program is followed
-(`Flattener`, of which each language has its own); then it is read and followed again, and must make the same motions.
+A block that is executed in several states (in a loop, a subprogram, a repeated cycle) can be corrected for only one of
+them. In the flat program each execution is a block of its own. It is written while the program is followed (by the
+language's `Flattener`); then it is parsed and followed, and must make the same motions.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ if TYPE_CHECKING:
 
 TOO_LONG, NOT_FLAT = "NCF238", "NCF239"
 LINES = 500_000
-"""A flat program has no more lines."""
+"""Largest number of lines of a flat program."""
 
 LEADING = (MotionKind.RAPID, MotionKind.CYCLE)
-"""Motions that lead somewhere, wherever they begin."""
+"""Motions whose end position does not depend on where they begin."""
 
 ROUNDINGS = 2.0
-"""By so many least increments an end may be off: numbers are rounded to them, and several may add up."""
+"""Largest deviation of an end position, in least increments: numbers are rounded to them, and several may add up."""
 
 
 class Change(NamedTuple):
-    """Text of a block to be replaced: from `start` up to `stop`, places in the source."""
+    """Replacement of the source bytes from `start` up to `stop` by `text`."""
 
     start: int
     stop: int
@@ -47,15 +47,16 @@ class Change(NamedTuple):
 
 
 class Flattener:
-    """Watches the interpreter, and writes down every block as it is executed.
+    """Watches the interpreter and writes down every block as it is executed.
 
-    One walk over the items of a block puts numbers in the place of formulas, and drops what only leads elsewhere. What
-    becomes of a word, an assignment, a name or other text (None: it stays), and how numbers look, a language says.
+    One pass over the items of a block replaces expressions by numbers and drops items that only direct the program
+    flow. The language defines the new text of words, assignments, names and other text (None: unchanged), and the
+    number format.
 
     steps  axis letter -> least increment of its axis, mm or degree
-    limit  of lines; `lines` are those so far
-    unit, block  what is executed; `line`: of the main program, that block or the one that has called
-    with_blank   the blank before an item that is dropped falls away, too
+    limit  largest number of lines; `lines`: the lines so far
+    unit, block  what is executed; `line`: the line of that block in the main program, or of the block that called
+    with_blank   whether the blank before a dropped item is dropped, too
     """
 
     with_blank = False
@@ -68,25 +69,25 @@ class Flattener:
         self.block = 0
 
     def watch(self, unit: TextUnit[Any], block: int) -> None:
-        """A block is executed."""
+        """Called before a block is executed."""
         self.unit, self.block = unit, block
         if not unit.external:
             self.line = unit.program.line(block)
 
     def write(self, text: str, below: int = 0) -> None:
-        """One line more, from `below` lines further down in the original; raises `Fault` NCF238 beyond the limit."""
+        """Append a line; its original is `below` lines after `line`. Raises `Fault` NCF238 beyond the limit."""
         if len(self.lines) >= self.limit:
             hint = "a program so long is better corrected where it is made"
             raise Fault(TOO_LONG, f"written out flat the program has more than {self.limit} lines", hint)
         self.lines.append(FlatLine(text, self.line + below))
 
     def changes(self) -> list[Change]:
-        """What becomes of the items of the block."""
+        """The changes to all items of the block."""
         found = map(self.rewritten, self.unit.program.items_of(self.block))
         return [change for change in found if change is not None]
 
     def rewritten(self, item: Item) -> Change | None:
-        """What becomes of an item."""
+        """The change to an item; None if it stays."""
         match item:
             case Word():
                 return self.word(item)
@@ -101,27 +102,27 @@ class Flattener:
         return None
 
     def word(self, word: Word) -> Change | None:
-        """What becomes of a word."""
+        """The change to a word."""
         return None
 
     def assignment(self, item: Assignment) -> Change | None:
-        """What becomes of an assignment."""
+        """The change to an assignment."""
         return None
 
     def command(self, command: Command) -> Change | None:
-        """What becomes of a name."""
+        """The change to a name."""
         return None
 
     def opaque(self, item: Opaque) -> Change | None:
-        """What becomes of text that is not taken apart."""
+        """The change to text that is not parsed."""
         return None
 
     def replaced(self, span: Span, text: str) -> Change:
-        """Other text in the place of a span of the block."""
+        """Replace a span of the block by other text."""
         return Change(*self.unit.program.span(self.block, span), text)
 
     def dropped(self, item: Item) -> Change:
-        """An item falls away."""
+        """Remove an item."""
         program = self.unit.program
         start, stop = program.span(self.block, item.span)
         if self.with_blank and start > int(program.blocks[self.block, 0]) and program.source[start - 1] in b" \t":
@@ -129,7 +130,7 @@ class Flattener:
         return Change(start, stop)
 
     def text(self, changes: Iterable[Change]) -> str:
-        """The text of the block with changes made, as Latin-1; one that lies within another does not count."""
+        """The text of the block with the changes made, decoded as Latin-1; a change inside another one is ignored."""
         program = self.unit.program
         at, stop = map(int, program.blocks[self.block])
         text = ""
@@ -145,8 +146,8 @@ class Flattener:
 class Flat:
     """A flat program.
 
-    program  read, under the path of the original
-    lines    the line of the original for each of its lines
+    program  parsed, with the path of the original
+    lines    for each of its lines, the line of the original
     """
 
     program: Program
@@ -163,7 +164,7 @@ def flatten(
     kinematics: Kinematics | None = None,
     limit: int = LINES,
 ) -> Flat:
-    """Write a program out flat; arguments as of `trace` and `Flattener`.
+    """Write a program out flat; for the arguments see `trace` and `Flattener`.
 
     Raises RefusedError NCF237 where what is executed depends on the machine at run time, NCF238 beyond the limit,
     NCF239 if the language cannot, or if the flat program would not make the same motions.
@@ -190,11 +191,11 @@ def flatten(
 
 
 def difference(before: Moves, after: Moves, steps: Mapping[str, float]) -> str:
-    """What is different between the motions of a program and those of its flat form; empty if nothing is.
+    """The first difference between the motions of a program and of its flat form, in words; empty if they agree.
 
-    A refused arc without an angle stands in for a curve of any kind that is not followed. Where an axis stands at the
-    end of a rapid, or at a hole, the flat form may tell, and the program not: holes that the control would make up lead
-    it there.
+    A refused arc without a sweep stands for a curve of any kind that ncfix does not follow. At the end of a rapid or at
+    a hole, the flat form may state a position that the program leaves unknown: positions of holes that the control
+    computes.
     """
     rows, flat = (np.flatnonzero(moves.kind != MotionKind.DWELL) for moves in (before, after))
     if len(rows) != len(flat):

@@ -1,14 +1,13 @@
-"""Where a program goes on: operations to which languages lower their control structures, and what executes them.
+"""Program flow: the operations to which languages lower their control structures, and their execution.
 
-A language lowers labels, jumps, branches, loops and calls of a block once, to operations; what depends on the state of
-the control (a condition, a computed target, how often) is a function in them. Calls that have not returned, sections
-under repetition and counts of loops stand here, for all languages.
+A language translates the labels, jumps, branches, loops and calls of a block once into operations; whatever depends on
+the state of the control (a condition, a computed target, a repeat count) is a function in them. Open calls, repeated
+sections and loop counts are kept here, for all languages.
 
-Programs that go round for ever are found by their jumps back: the same one is made again, and nothing has changed that
-a jump depends on. Which way a program goes depends on its variables alone, on the calls that are open, and on how
-often repetitions are still to be made; where the axes stand does not matter unless the program reads it, which counts
-as a change here. So a second jump of that kind shows that there will be a third. A loop that counts something has to be
-followed instead, up to a bound on all that is executed.
+Endless programs are recognised by their backward jumps: the same jump is made again and nothing that jumps depend on
+has changed. The flow depends only on variables, open calls and remaining repetitions; axis positions do not matter
+unless the program reads them, which counts as a change. So a second such jump proves that there will be a third. A loop
+that counts must be executed instead, up to a bound on the number of executed blocks.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ ENDLESS = "NCF233"
 NEVER_ENDS = "the program never ends: it jumps back here again and again, and nothing changes in between"
 WAITS = "the program goes round here until something changes that only the machine knows"
 MOST = 100_000
-"""Jumps that are remembered; from different calls, one jump is another."""
+"""Largest number of backward jumps remembered; the same jump from different calls counts separately."""
 
 TOO_DEEP = "NCF232"
 NO_SUBPROGRAM = "NCF231"
@@ -33,22 +32,22 @@ NO_LABEL = "NCF230"
 
 @mutable
 class BlockBudget:
-    """How much may still be executed; a hole of a cycle, and a subprogram that is gone through, count as blocks too.
+    """Number of blocks that may still be executed; each hole of a cycle and each subprogram run counts as a block too.
 
-    most  blocks beyond those of the text, for what is said
-    left  blocks that may still be executed, those of the text included
+    most  blocks allowed in addition to those of the text, for the message
+    left  blocks that may still be executed, including those of the text
     """
 
     most: int
     left: int
 
     def spend(self, blocks: int) -> None:
-        """Count what is executed; raises `Fault` where it is too much."""
+        """Count executed blocks; raises `Fault` if there are more than allowed."""
         self.foresee(blocks)
         self.left -= blocks
 
     def foresee(self, blocks: int) -> None:
-        """Raise `Fault` at once where it will take more blocks than are left."""
+        """Raise `Fault` if `blocks` more would exceed the budget."""
         if blocks > self.left:
             text = f"the program seems to be endless: it executes more than {self.most:,} blocks"
             raise Fault(ENDLESS, text, "if it does end, most_blocks = ... in the setup file allows more")
@@ -56,12 +55,12 @@ class BlockBudget:
 
 @mutable
 class Recurrence:
-    """The jumps back that a program has made: what had changed by then, as a count."""
+    """Backward jumps made so far, each with the count of changes at that time."""
 
     made: dict[Hashable, int] = field(default_factory=dict)
 
     def seen(self, jump: Hashable, changes: int) -> bool:
-        """Note a jump back, and tell whether it was made before and nothing has changed since."""
+        """Record a backward jump; returns whether it was made before and nothing has changed since."""
         before = self.made.get(jump)
         if len(self.made) >= MOST:
             self.made.clear()
@@ -70,7 +69,7 @@ class Recurrence:
 
 
 class Blocks(Protocol):
-    """A text that is executed: blocks from `begin` up to `stop`."""
+    """A text to execute: blocks from `begin` up to `stop`."""
 
     @property
     def begin(self) -> int:
@@ -85,19 +84,19 @@ U = TypeVar("U", bound=Blocks)
 
 
 def nothing() -> None:
-    """Nothing is to be done."""
+    """Do nothing."""
 
 
 @mutable
 class OpenCall(Generic[U]):
     """A call that has not returned.
 
-    name   of what is called
-    entry  the text and block where that begins
-    left   how many more times it runs
-    kind   of call, where the language ends different ones by different means
-    again  done before it runs once more; `leave`: when it returns for good
-    back   text and block where to go on then; `sections`: those of the caller that are being repeated
+    name   of the subprogram
+    entry  text and block at which it begins
+    left   number of runs still to come
+    kind   kind of call, if the language ends different kinds by different means
+    again  called before each further run; `leave`: called on the final return
+    back   text and block at which to continue then; `sections`: repeated sections of the caller
     """
 
     name: str
@@ -112,7 +111,7 @@ class OpenCall(Generic[U]):
 
 @mutable
 class Section:
-    """Blocks from `start` up to `stop` that are executed so many times more, before going on at `back`."""
+    """Blocks from `start` up to `stop` that are executed `left` more times before execution continues at `back`."""
 
     start: int
     stop: int
@@ -121,15 +120,15 @@ class Section:
 
 
 class Let(NamedTuple):
-    """Something gets a value, or is checked."""
+    """Assign a value, or check something."""
 
     do: Callable[[], object]
 
 
 class Jump(NamedTuple):
-    """Go on at a block of the same text (None: at the next one), if a condition holds.
+    """Continue at a block of the same text (None: at the next block), if the condition holds.
 
-    out  repetitions of sections in which that block does not stand are over
+    out  ends the repetition of sections that do not contain that block
     """
 
     to: int | Callable[[], int | None] | None
@@ -138,10 +137,10 @@ class Jump(NamedTuple):
 
 
 class Repeat(NamedTuple):
-    """Execute a section of the text again, so many times.
+    """Execute a section of the text again, `times` times.
 
-    to    where it begins
-    stop  the block behind it, from where to come back; None: it ends with the block of the operation itself
+    to    its first block
+    stop  the block after its last; None: it ends with the block of the operation itself
     """
 
     to: Callable[[], int]
@@ -150,15 +149,15 @@ class Repeat(NamedTuple):
 
 
 class Call(NamedTuple):
-    """Enter a subprogram; None: nothing is to be executed."""
+    """Enter a subprogram; `enter` returns None if there is nothing to execute."""
 
     enter: Callable[[], OpenCall[Any] | None]
 
 
 class Return(NamedTuple):
-    """Go back to the caller, or run again what it calls several times; without a caller the program ends.
+    """Return to the caller, or run the subprogram again if runs remain; without a caller the program ends.
 
-    kind  the calls that end with this one, the calls in them included; empty: any
+    kind  also ends the calls inside the innermost call of this kind; empty: returns from the innermost call of any kind
     """
 
     when: Callable[[], bool] | None = None
@@ -169,14 +168,14 @@ Operation = Let | Jump | Repeat | Call | Return
 
 
 class ProgramFlow(Generic[U]):
-    """Where execution stands, and what takes it elsewhere.
+    """The program counter, the calls and the repetitions of a program being followed.
 
-    unit, block  what is executed next: the program counter
-    calls        those that have not returned, the outermost first
-    sections     of this text that are being repeated
-    counts       how often what is repeated in its place is still to be made, by what counts
-    ended        the program has ended
-    most_calls   so many calls may be open; `too_deep` says what is wrong with more
+    unit, block  the block to execute next: the program counter
+    calls        open calls, the outermost first
+    sections     repeated sections of this text
+    counts       remaining runs of operations that repeat up to their own block, by operation
+    ended        whether the program has ended
+    most_calls   largest number of open calls; `too_deep`: message if it is exceeded
     """
 
     most_calls = 0
@@ -190,7 +189,7 @@ class ProgramFlow(Generic[U]):
         self.ended = False
 
     def arrive(self) -> bool:
-        """Settle what is executed next, at the end of a section that is repeated; whether the text has such a block."""
+        """Resolve the next block at the end of repeated sections; returns whether the text has such a block."""
         while self.sections and self.block == self.sections[-1].stop:
             section = self.sections[-1]
             section.left -= 1
@@ -201,14 +200,14 @@ class ProgramFlow(Generic[U]):
         return self.block < self.unit.stop
 
     def under_way(self) -> tuple[object, ...]:
-        """The calls that have not returned, and what is still to be repeated."""
+        """Open calls and remaining repetitions, in comparable form."""
         calls = tuple((id(call.back[0]), call.back[1], call.left) for call in self.calls)
         levels = [self.sections, *(call.sections for call in self.calls)]
         sections = tuple((section.start, section.left) for level in levels for section in level)
         return calls, sections, tuple(self.counts.items())
 
     def follow(self, operations: Iterable[Operation]) -> bool:
-        """Execute operations until one leads elsewhere; whether none has."""
+        """Execute operations until one changes the program counter; returns whether none did."""
         for operation in operations:
             if isinstance(operation, Let):
                 operation.do()
@@ -230,14 +229,14 @@ class ProgramFlow(Generic[U]):
         return True
 
     def jump(self, block: int | None, *, out: bool = False) -> None:
-        """Go on at a block of this text, see `Jump`."""
+        """Continue at a block of this text, see `Jump`."""
         if block is not None:
             self.block = block
         if block is not None and out:
             self.sections = [section for section in self.sections if section.start <= block < section.stop]
 
     def _repeat(self, repeat: Repeat) -> bool:
-        """Whether there is something to be repeated."""
+        """Begin a repetition; returns whether anything is repeated."""
         if repeat.stop is None:
             key = id(self.unit), self.block
             left = self.counts.get(key, -1)
@@ -257,7 +256,7 @@ class ProgramFlow(Generic[U]):
         return times > 0 and stop > start
 
     def enter(self, call: OpenCall[U]) -> None:
-        """Begin a call; raises `Fault` where too many are open."""
+        """Enter a call; raises `Fault` if too many calls are open."""
         self.check_depth(call.name)
         call.back, call.sections = (self.unit, self.block), self.sections
         self.calls.append(call)
@@ -265,12 +264,12 @@ class ProgramFlow(Generic[U]):
         self.sections = []
 
     def check_depth(self, name: str) -> None:
-        """Raise `Fault` where one call more would be too many."""
+        """Raise `Fault` if one more call would be too many."""
         if len(self.calls) >= self.most_calls:
             raise Fault(TOO_DEEP, self.too_deep.format(name))
 
     def finish(self, kind: str = "", *, again: bool = True) -> None:
-        """Return from a call, or run it again (if that is `again` wanted); the program ends where none is open."""
+        """Return from a call, or run it again if runs remain and `again` is set; without a call the program ends."""
         while kind and self.calls and self.calls[-1].kind != kind:
             self.calls.pop().leave()
         if not self.calls:

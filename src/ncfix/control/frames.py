@@ -1,8 +1,8 @@
-"""Frames: what lies between the numbers of a program and the commands of the axes, for all languages.
+"""Coordinate frames between program coordinates and axis commands, for all languages.
 
-A point `p` of a frame is `shift + rotation @ (scale * p)` one frame further out. A control stacks several of them, from
-the work offset to what the program has set last; in which order, its language says. The length of the tool comes on
-top. How a tilted plane lies, programs say by angles, vectors or points: these forms are here, too.
+A point `p` of a frame is `shift + rotation @ (scale * p)` in the next frame outwards. A control stacks several frames,
+from the work offset to the innermost programmed one; the language defines their order. The tool length is added on top.
+The forms in which programs state a tilted plane (angles, vectors, points) are here, too.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from ncfix.values import frozen
 
 ZEROS = (0.0,) * N_LETTERS
 AROUND = {"X": PLANES[190], "Y": PLANES[180], "Z": PLANES[170]}
-"""The plane in which a rotation about an axis turns."""
+"""The plane in which a rotation about each axis turns."""
 
 
 def mixed_into(unknown: UnknownAxes, rotation: Rotation) -> UnknownAxes:
-    """What is not known of turned axes, each of which is made of those in its row: of one of them it is enough."""
+    """Reasons for unknown coordinates after a rotation: a turned axis is unknown if any axis it is composed of is."""
     mixed = {index: why for index, why in unknown.items() if index > 2}
     for index in range(3):
         why = next((unknown[k] for k in range(3) if rotation[index][k] != 0.0 and k in unknown), None)
@@ -45,13 +45,13 @@ def mixed_into(unknown: UnknownAxes, rotation: Rotation) -> UnknownAxes:
 
 @frozen
 class Affine:
-    """One frame.
+    """A coordinate frame: shift, rotation and scale.
 
     shift     nine numbers in the order of the axis letters, mm and rad
-    rotation  of X Y Z; a mirrored axis makes its determinant negative
+    rotation  of X Y Z; with a mirrored axis its determinant is negative
     scale     one factor for X Y Z
-    unknown   letter index -> why what the frame adds to the numbers of this letter is not known; of X Y Z along the
-              axes of the frame itself
+    unknown   letter index -> why the frame's contribution to this coordinate is not known; for X Y Z along the axes of
+              the frame itself
     """
 
     shift: Sequence[float] = ZEROS
@@ -60,7 +60,7 @@ class Affine:
     unknown: UnknownAxes = field(default_factory=dict)
 
     def then(self, inner: Affine) -> Affine:
-        """The frame of `inner` within this one."""
+        """The frame `inner`, given in this frame, as one frame."""
         if inner is WORLD:
             return self
         if self is WORLD:
@@ -80,20 +80,20 @@ class Affine:
 
 
 WORLD = Affine()
-"""The frame that changes nothing."""
+"""The identity frame."""
 
 
 @frozen
 class FrameStack:
     """The frames in force.
 
-    order         the slots that the language stacks, the outermost first
-    name          of the work offset: G54, PRESET2
-    datum         the work offset or preset, with a rotation of its own (G10 R)
+    order         slots that the language stacks, the outermost first
+    name          name of the work offset: G54, PRESET2
+    datum         work offset or preset, with its own rotation (G10 R)
     additive      G92
     local         G52, or a datum shift along the axes of a tilted plane
-    plane         a tilted plane: G68.2, CYCLE800, PLANE, cycle 19
-    programmable  TRANS, ROT and their like, or the datum shift of cycle 7
+    plane         tilted plane: G68.2, CYCLE800, PLANE, cycle 19
+    programmable  TRANS, ROT and similar, or the datum shift of cycle 7
     rotation      G68, cycle 10
     mirror        G51.1, cycle 8
     scaling       cycle 11
@@ -112,7 +112,7 @@ class FrameStack:
 
     @property
     def whole(self) -> Affine:
-        """All of them as one."""
+        """All frames composed into one."""
         whole = WORLD
         for slot in reversed(self.order):
             whole = getattr(self, slot).then(whole)
@@ -123,12 +123,12 @@ class FrameStack:
 
 
 def shifted(values: Mapping[int, float]) -> Affine:
-    """A frame that only shifts: letter index -> mm or rad."""
+    """A pure shift: letter index -> mm or rad."""
     return WORLD.shifted_to(values) if values else WORLD
 
 
 def turned(angles: Mapping[str, float], order: str = "ZYX") -> Affine:
-    """A frame that turns about the axes in that order, each as the ones before have left it; degrees.
+    """A rotation about the axes in `order`, each as turned by those before it; angles in degrees.
 
     `ROT X Y Z` turns about Z first, then Y, then X (RPY, the default of MD10600).
     """
@@ -140,24 +140,24 @@ def turned(angles: Mapping[str, float], order: str = "ZYX") -> Affine:
 
 
 def turned_in(plane: Plane, degrees: float) -> Affine:
-    """A turn in a plane, about the zero point."""
+    """A rotation in a plane about the zero point."""
     return Affine(rotation=about(plane, degrees))
 
 
 def turned_about(rotation: Rotation, centre: Sequence[float]) -> Affine:
-    """A turn, or a mirror, that leaves a point where it is: nine numbers, mm and rad."""
+    """A rotation or mirroring that leaves the point `centre` (nine numbers, mm and rad) in place."""
     away = rotated(rotation, list(centre))
     return Affine(tuple(c - t for c, t in zip(centre, away, strict=True)), rotation)
 
 
 def mirrored(letters: str) -> Rotation:
-    """What makes the axes named run the other way."""
+    """The matrix that reverses the named axes."""
     signs = [-1.0 if letter in letters else 1.0 for letter in "XYZ"]
     return as_rotation([[signs[i] if i == k else 0.0 for k in range(3)] for i in range(3)])
 
 
 def handed(rotation: Rotation) -> float:
-    """1, or -1 where an odd number of axes is mirrored."""
+    """Handedness of a rotation: 1, or -1 if an odd number of axes is mirrored."""
     (a, b, c), (d, e, f), (g, h, i) = rotation
     return 1.0 if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0 else -1.0
 
@@ -166,7 +166,7 @@ def handed(rotation: Rotation) -> float:
 
 
 def spatial(angles: Mapping[str, float], order: str = "XYZ") -> Rotation:
-    """Turned about the axes of the workpiece in that order, which stand still; degrees.
+    """Rotation about the fixed axes of the workpiece, in `order`; angles in degrees.
 
     SPA, SPB and SPC turn about X, then Y, then Z; so do roll, pitch and yaw.
     """
@@ -177,15 +177,15 @@ def spatial(angles: Mapping[str, float], order: str = "XYZ") -> Rotation:
 
 
 def euler(precession: float, nutation: float, rotation: float) -> Rotation:
-    """Euler angles, degrees: about Z, about the turned X, about the tilted Z."""
+    """Rotation by Euler angles, degrees: about Z, about the turned X, about the tilted Z."""
     return product(about(PLANES[170], precession), product(about(PLANES[190], nutation), about(PLANES[170], rotation)))
 
 
 def projected(about_y: float, about_x: float, turn: float) -> Rotation | None:
-    """Projection angles, degrees: the tilt as it shows in the Z/X and in the Y/Z plane, and a turn in the plane.
+    """Rotation by projection angles, degrees: the tilt seen in the Z/X and Y/Z planes, and a turn in the plane.
 
-    The new X lies in the old plane Z/X, turned as by an angle about Y (PROPR); the plane cuts Y/Z at an angle as about
-    X (PROMIN); then it turns about the new Z. None where the two lines do not span a plane.
+    The new X lies in the old Z/X plane, turned by an angle about Y (PROPR); the tilted plane cuts Y/Z at an angle about
+    X (PROMIN); then it turns about the new Z (`turn`). None if the two lines do not span a plane.
     """
     x, _, _ = zip(*about(PLANES[180], about_y), strict=True)
     _, trace, _ = zip(*about(PLANES[190], about_x), strict=True)
@@ -196,9 +196,9 @@ def projected(about_y: float, about_x: float, turn: float) -> Rotation | None:
 
 
 def from_vectors(base: Triple, normal: Triple, least: float = 1e-12) -> Rotation | None:
-    """The plane with a normal and an X axis that lies in the direction of `base`.
+    """Rotation to the plane with the given normal (Z) and its X axis towards `base`.
 
-    None if one of them is shorter than `least`, or the sine of the angle between them is less.
+    None if either vector is shorter than `least`, or the sine of the angle between them is less than `least`.
     """
     z, x = unit(normal, least), unit(base, least)
     if z is None or x is None or unit(cross(z, x), least) is None:
@@ -209,7 +209,7 @@ def from_vectors(base: Triple, normal: Triple, least: float = 1e-12) -> Rotation
 
 
 def from_points(first: Triple, second: Triple, third: Triple, least: float = 1e-12) -> Rotation | None:
-    """The plane through three points: X from the first to the second, the third on the side of +Y."""
+    """Rotation to the plane through three points: X from the first to the second, the third on the +Y side."""
     along, other = minus(second, first), minus(third, first)
     return from_vectors(along, cross(along, other), least)
 
@@ -220,6 +220,6 @@ def minus(a: Triple, b: Triple) -> Triple:
 
 
 def unit(a: Triple, least: float = 1e-12) -> Triple | None:
-    """A vector of length one; None if it is shorter than `least`."""
+    """The unit vector along `a`; None if `a` is shorter than `least`."""
     length = math.hypot(*a)
     return None if length < least else (a[0] / length, a[1] / length, a[2] / length)

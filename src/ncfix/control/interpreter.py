@@ -1,12 +1,12 @@
-"""The walk of a control through a program, block after block, as its flow leads: the same for all languages.
+"""The execution of a program block by block, in the order of its flow; common to all languages.
 
-A language says what a block does (`execute`), under which names it looks for the files of subprograms, and what the
-end of a text means. Here is what surrounds that: where execution stands, the fast lane, block delete, how much may be
-executed, programs that go round for ever, where in the program a fault is, and programs that come in parts.
+A language defines what a block does (`execute`), the file names of its subprograms, and what the end of a text means.
+Everything around that is here: the program counter, the fast lane, block delete, the limit on executed blocks, endless
+programs, the place of a fault in the program, and programs that come in parts.
 
-What it walks through is a `TextUnit`: a program, one of several that stand in a file, or the file of a subprogram.
+The text that is executed is a `TextUnit`: a program, one of several programs in a file, or the file of a subprogram.
 
-`FollowedLanguage` names what a family of controls has of its own for that.
+`FollowedLanguage` lists what a family of controls provides for this.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ if TYPE_CHECKING:
 
 
 P = TypeVar("P")
-"""What a language works out of a shape: its plan, with `skip` (which switches of block delete) and `lane`."""
+"""What a language prepares for a block shape, with `skip` (its block delete switches) and `lane`."""
 
 
 class TextUnit(ABC, Generic[P]):
     """Blocks from `begin` up to `stop` of a program, with the plans of their shapes.
 
-    external  the file that it comes from; empty for what stands in the main program's own text
-    plans     by shape, made when first asked for; units of one program share them
-    template  index of each block's shape; `first`: where its numbers begin among `numbers`
-    operations  what the control structures of blocks come down to, see `flow`; made when a block is first executed
-    ahead     what the fast lane has seen of the blocks to come
+    external  name of the file; empty for text of the main program
+    plans     plan of each shape, made on first use; units of one program share them
+    template  index of each block's shape; `first`: index of its first number in `numbers`
+    operations  control structures of blocks as operations, see `flow`; made when a block is first executed
+    ahead     what the fast lane has read of the blocks to come
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class TextUnit(ABC, Generic[P]):
         self.take(program, *(blocks or (0, len(program))))
 
     def take(self, program: Program, begin: int, stop: int) -> None:
-        """Become a text of these blocks."""
+        """Refer to blocks `begin` up to `stop` of `program`."""
         self.program, self.begin, self.stop = program, begin, stop
         self.plans += [None] * (len(program.templates) - len(self.plans))
         self.template: Sequence[int] = view(program.template)
@@ -79,12 +79,12 @@ class TextUnit(ABC, Generic[P]):
         self._stops: Ints | None = None
 
     def plan(self, block: int) -> P:
-        """What a block does."""
+        """The plan of a block."""
         shape = self.template[block]
         return self.plans[shape] or self.plan_of_shape(shape)
 
     def plan_of_shape(self, shape: int) -> P:
-        """What blocks of a shape do."""
+        """The plan of a shape."""
         plan = self.plans[shape]
         if plan is None:
             plan = self.plans[shape] = self.plan_of(self.program.templates[shape])
@@ -95,7 +95,7 @@ class TextUnit(ABC, Generic[P]):
         return [self.plan_of_shape(shape) for shape in range(len(self.plans))]
 
     def blocks_of(self, shapes: Collection[int]) -> list[int]:
-        """The blocks of some shapes, in order."""
+        """The blocks that have one of these shapes, in order."""
         if not shapes:
             return []
         found = np.flatnonzero(np.isin(self.program.template[self.begin : self.stop], list(shapes))) + self.begin
@@ -112,7 +112,7 @@ class TextUnit(ABC, Generic[P]):
 
     @abstractmethod
     def closed(self) -> Mask:
-        """(s,) shapes that cannot go through the fast lane."""
+        """(s,) whether blocks of each shape cannot go through the fast lane."""
 
     def tables(self) -> Any:
         """The lanes of all shapes as columns, made once."""
@@ -137,26 +137,26 @@ NAMES_AN_AXIS = re.compile(
     rb"(?:\([^)\r\n]*\)|\"[^\"\r\n]*\"|[^(;%\"\r\n])*?"
     rb"(?<![A-Z_$#<])I?[XYZABCUVW][ \t]*=?[ \t]*[-+]?[ \t]*(?:[.,]?\d|[#\[]|Q[LR]?\d|R\d)"
 )
-"""A block with an axis word, in any of the languages; none stands in comments, in strings and in names of programs."""
+"""Matches a block with an axis word, in any language; ignores comments, strings and program names."""
 RUNTIME = "NCF237"
-"""What is executed is known only at run time, so that no flat program can say it."""
+"""What is executed depends on the machine at run time, so the program cannot be written out flat."""
 
 U = TypeVar("U", bound=TextUnit[Any])
 
 
 class Interpreter(ABC, Generic[U]):
-    """Follows one program, or one that comes in parts.
+    """Follows a program, whole or in parts.
 
-    main      the program itself
-    flow      where execution stands
-    files     the texts of subprograms, by their names
-    span      what of the block is looked at, for messages
-    watcher   writes blocks down as they are executed, if the program is to be written out flat
-    in_parts  the text comes part by part; `first` and `last`: this is the first, the last of them
-    ended     the program has ended
-    behind    the block of the main text behind which the program has ended; None: where it ends is not known
-    executed  the blocks of the main text that were executed one by one; in parts only those of subprograms
-    jumped    (first, stop) blocks of the main text over which the program has jumped
+    main      text of the main program
+    flow      program counter, calls and repetitions
+    files     texts of subprogram files by name; None: not found
+    span      part of the block being evaluated, for messages
+    watcher   writes down the blocks as they are executed, if the program is to be written out flat
+    in_parts  whether the text comes in parts; `first` and `last`: whether this is the first, the last part
+    ended     whether the program has ended
+    behind    the block of the main text after the program's end; None: the end is not known
+    executed  blocks of the main text executed one by one; of a program in parts only those executed in calls
+    jumped    ranges (first, stop) of blocks of the main text that the program jumped over
     """
 
     main: U
@@ -183,50 +183,50 @@ class Interpreter(ABC, Generic[U]):
 
     @abstractmethod
     def execute(self, plan: Any, unit: U, block: int) -> bool:
-        """Execute a block, `flow.block` is already that of the next one; True if the program ends there."""
+        """Execute a block; `flow.block` is already the next one. Returns whether the program ends here."""
 
     @abstractmethod
     def spellings(self, name: str) -> Iterable[str]:
-        """The names under which the file of a subprogram is looked for."""
+        """The file names under which a subprogram is looked for."""
 
     @abstractmethod
     def text_of_file(self, source: bytes, name: str, spelling: str) -> U:
-        """The text of a subprogram that was found."""
+        """The text of a subprogram file that was found."""
 
     @abstractmethod
     def end_of_text(self) -> bool:
-        """The text is over, and the program has not ended; whether it goes on (in one that called)."""
+        """Handle the end of a text before the program's end; returns whether execution continues (in a caller)."""
 
     @property
     @abstractmethod
     def changes(self) -> int:
-        """How often anything has changed that decides where the program goes on."""
+        """Count of changes of anything that decides where the program goes on."""
 
     @property
     def why_endless(self) -> str:
-        """What is said of a program that goes round for ever."""
+        """The message for an endless program."""
         return NEVER_ENDS
 
     def lane_is_open(self, plan: Any) -> bool:
-        """Whether plain motions that begin with this block may be taken many at once."""
+        """Whether the motions from this block on may be followed at once."""
         return plan.lane is not None
 
     def run_lane(self, unit: U, block: int, plan: Any) -> int:
-        """Take plain motions from a block on; how many blocks are taken, 0 for none."""
+        """Follow simple motions from `block` on; returns the number of blocks followed, 0 for none."""
         return run_lane(self.control, unit, block, not unit.external, partial(turned, self.control, unit))
 
     def note_stretch(self, unit: U, block: int, done: int) -> None:
-        """Blocks from `block` on have been taken at once."""
+        """Called after `done` blocks from `block` on were followed at once."""
 
     def moves(self) -> Moves:
-        """The motions of the program, when it has been followed."""
+        """The motions of the program, after it has been followed."""
         return self.control.moves()
 
     def note_uncorrected(self, program: Program, moves: Moves) -> None:
-        """Say where blocks begin that name axes though the program never goes through them.
+        """Report where blocks begin that name axes but are never executed.
 
-        They are those of other programs in the file, of subprograms that nothing calls, and of branches that are not
-        taken. `program` and `moves`: what was followed last, with the end of the program.
+        They belong to other programs in the file, to subprograms that nothing calls, or to branches that are not taken.
+        `program` and `moves`: the program, or its last part.
         """
         if self.behind is None:
             return
@@ -250,7 +250,7 @@ class Interpreter(ABC, Generic[U]):
     def _note_first(
         self, program: Program, executed: set[int], spans: Iterable[tuple[int, int]], text: str, hint: str
     ) -> None:
-        """Remark on the first block of some spans, in order, that names an axis and was not executed."""
+        """Report the first block in `spans`, in order, that names an axis and was not executed."""
         seen = 0
         for first, stop in spans:
             first, seen = max(first, seen), max(stop, seen)
@@ -263,25 +263,25 @@ class Interpreter(ABC, Generic[U]):
 
     @property
     def to_the_last(self) -> bool:
-        """What stands behind the end of the program matters: something was looked for that may be there."""
+        """Whether text after the end of the program matters, because something was searched that may be there."""
         return True
 
     def check_part(self, program: Program) -> None:
-        """Raise `NotInPartsError` where what is in a part depends on an earlier one in a way that is not kept."""
+        """Raise `NotInPartsError` if the part depends on an earlier one in a way that a checkpoint does not keep."""
 
     def check_motions(self, program: Program, moves: Moves) -> None:
-        """As `check_part`, when the part has been followed."""
+        """Like `check_part`, after the part has been followed."""
 
     # -- where we are -------------------------------------------------------------------------------------------------
 
     def place(self) -> Place:
-        """Where in the program we are."""
+        """The place in the program of the block being executed."""
         unit, block = self.flow.unit, self.flow.block - 1
         inside = unit.begin <= block < unit.stop
         return unit.program.place(block, self.span) if inside else Place(unit.program.path)
 
     def find(self, name: str) -> U | None:
-        """The text of a subprogram in a file of its own."""
+        """The text of a subprogram file; None if it is not found."""
         if name not in self.files:
             spellings = dict.fromkeys(self.spellings(name)) if self.resolve else ()
             found = ((each, source) for each in spellings if self.resolve and (source := self.resolve(each)))
@@ -289,7 +289,7 @@ class Interpreter(ABC, Generic[U]):
         return self.files[name]
 
     def read(self, source: bytes, path: str) -> Program:
-        """The file of a subprogram."""
+        """Parse the file of a subprogram."""
         return read(source, path, self.dialect)
 
     # -- the walk -----------------------------------------------------------------------------------------------------
@@ -303,7 +303,7 @@ class Interpreter(ABC, Generic[U]):
             raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
 
     def next_part(self, program: Program, blocks: int) -> None:
-        """Take the next part; so many blocks may be executed."""
+        """Go on with the next part, in which at most `blocks` blocks may be executed."""
         self.main = copy(self.main)  # whoever holds the part before keeps it
         self.main.take(program, 0, len(program))
         self.flow.unit, self.flow.block = self.main, 0
@@ -311,7 +311,7 @@ class Interpreter(ABC, Generic[U]):
         self.control.budget.left = blocks
 
     def walk(self) -> bool:
-        """Block after block; whether the program ends before its text does."""
+        """Execute block after block; returns whether the program ends before its text does."""
         control, flow = self.control, self.flow
         after, depth = flow.block, 0
         while True:
@@ -349,7 +349,7 @@ class Interpreter(ABC, Generic[U]):
                 self._look_round(block)
 
     def take_stretch(self, plan: Any) -> bool:
-        """Follow the plain motions that begin here many at once; whether there are any."""
+        """Follow the simple motions that begin here at once; returns whether there are any."""
         if not self.lane_is_open(plan):
             return False
         unit, block = self.flow.unit, self.flow.block
@@ -361,7 +361,7 @@ class Interpreter(ABC, Generic[U]):
         return done > 0
 
     def _look_round(self, block: int) -> None:
-        """A block has led back: raises `Fault` if the program goes round for ever."""
+        """After a backward jump: raise `Fault` if the program is endless."""
         flow = self.flow
         jump = id(flow.unit), block, flow.block, flow.under_way()
         if self._recurrence.seen(jump, self.changes):
@@ -373,7 +373,7 @@ class Interpreter(ABC, Generic[U]):
 
 
 class FlatLine(NamedTuple):
-    """A line of a flat program, and the line of the original that it comes from."""
+    """A line of a flat program, and the line of the original it comes from."""
 
     text: str
     line: int
@@ -383,10 +383,10 @@ class FlatLine(NamedTuple):
 class FollowedLanguage(Language):
     """How the programs of one family of controls are followed.
 
-    control   what the control keeps while it follows a program of a dialect
-    interpreter  (control, program, run) -> the walk through a program; `in_parts`: this is the first of its parts
-    unroll    (interpreter, least increments, limit) -> the blocks of a program as they are executed, see `flatten`;
-              None if the language cannot write them
+    control      (run, dialect) -> the state of the control
+    interpreter  (control, program, run) -> the interpreter; with `in_parts`, the program is its first part
+    unroll       (interpreter, least increments, limit) -> the lines of the flat program, see `flatten`; None if the
+                 language cannot be written out flat
     """
 
     control: Callable[[Run, Dialect], ProgramControl]

@@ -1,16 +1,15 @@
-"""Motions: what a block asks for, what the control does, and by which rule a motion may stay uncorrected.
+"""Motions: what a block demands, what the control does, and the rules by which a motion may stay uncorrected.
 
-`Moves` holds them as columns, one row per motion, in the order in which the control makes them. Positions are
-*commands*: what the control is told in its own coordinate system of axes, with work offsets, G92 and tool offsets
-added. Without tool-centre-point control a command is the machine's axis positions. With it (`tcp`), X Y Z of the
-command are the coordinates of the tool tip in the workpiece, turned with it; only the machine model can make axis
-positions of that.
+`Moves` holds motions as columns, one row per motion, in the order in which the control makes them. Positions are
+*commands*: positions in the control's axis coordinate system, with work offsets, G92 and tool offsets added. Without
+tool-centre-point control a command is the machine's axis positions. With it (`tcp`), X Y Z of the command are the
+coordinates of the tool tip in the workpiece, and turn with it; the machine model converts them to axis positions.
 
-`Motion` is one motion as its block means it, with what is not known of its end.
+`Motion` is one motion as its block states it, with reasons for what is unknown of its end.
 
-`Pass` lists all rules by which a motion may stay as it is, whatever the language of its program, with the motions that
-each may pass and the reason. The reports count such motions by rule. A motion that no rule may pass is corrected or
-refused. A feed, for example, never passes because its axis has no known position.
+`Pass` lists all rules by which a motion may stay uncorrected, in any language, with the kinds of motions that each may
+pass and the reason. A motion that no rule may pass is corrected or refused. A feed motion, for example, never passes
+because an axis position is unknown.
 """
 
 from __future__ import annotations
@@ -35,31 +34,31 @@ if TYPE_CHECKING:
 
 
 class MotionKind(IntEnum):
-    """What sort of motion."""
+    """The kind of a motion."""
 
     RAPID = 0
     FEED = 1
     ARC = 2
     CYCLE = 3
-    """A canned cycle's motion to one hole: `end` is the position over the hole at the depth it reaches, `approach` that
-    at the level from which it feeds."""
+    """The motion to one hole of a canned cycle: `end` is over the hole at the final depth, `approach` at the level from
+    which it feeds."""
     DWELL = 4
-    """No motion, kept for time."""
+    """No motion; kept for its time."""
 
 
 class Rule(IntEnum):
-    """What may be done to the block of a motion."""
+    """What may be done with the block of a motion."""
 
     CORRECT = 0
     """May be corrected."""
     PASS = 1
-    """Passed as it is, by rule: machine coordinates, reference points, probing, parking. `reason` says which."""
+    """Passed by rule, uncorrected: machine coordinates, reference points, probing, parking. `reason` says which."""
     REFUSE = 2
-    """Must not be changed, and is not right: `reason` says why."""
+    """Must not be changed, and cannot be corrected: `reason` says why."""
 
 
 class FeedMode(IntEnum):
-    """How F is meant."""
+    """The meaning of F."""
 
     PER_MINUTE = 94
     INVERSE_TIME = 93
@@ -68,38 +67,39 @@ class FeedMode(IntEnum):
 
 @frozen
 class TcpState:
-    """Whether tool-centre-point control is on, and the length of the tool that the control knows of, mm."""
+    """Whether tool-centre-point control is on, and the tool length that the control uses, mm."""
 
     on: bool
     tool_length: float
 
     @property
     def shift(self) -> float:
-        """How far a command along Z is from the axis position while all rotary axes stand at zero, mm."""
+        """Difference along Z between command and axis position with all rotary axes at zero, mm."""
         return self.tool_length if self.on else 0.0
 
 
 class Kinematics(Protocol):
-    """What a machine's own kinematics say about positions of its axes."""
+    """The kinematics of a machine, as far as programs need them."""
 
     @property
     def travel(self) -> Sequence[tuple[float, float]]:
-        """How far each axis goes, mm and rad; infinite where it is endless."""
+        """Travel of each axis (low, high), mm and rad; infinite for an endless axis."""
 
     def __call__(self, command: Sequence[float], before: TcpState, after: TcpState, /) -> Sequence[float]:
-        """A command (one number per axis) as it is under one state, said as it is under another."""
+        """The command (one number per axis) for the same machine position after TCP has changed its state."""
 
 
 @frozen
 class Frame:
-    """How the numbers in the program become a command: `command = offset + rotation @ (unit * program)`.
+    """Conversion of program numbers to a command: `command = offset + rotation @ (unit * program)`.
 
     offset    (n_axes,) mm, rad: work offset, G52/G92, tool offset, rotated where the control rotates them
     rotation  (3, 3) acts on X Y Z (G68, G10 R)
     unit      mm per program unit of linear words: 1.0 or 25.4
     diameter  X is programmed as a diameter (G7)
-    increments  what one unit of a number without a decimal point is worth, linear and rotary words, in those of a
-              number with one: 0.001 where the control counts least increments in such words
+    increments  weight of a number without a decimal point, for linear and rotary words: 0.001 where the control reads
+                such
+              numbers in least increments, else 1
     """
 
     offset: Array
@@ -111,17 +111,17 @@ class Frame:
 
 @frozen
 class CycleCall:
-    """The call of a cycle in a block by itself: what it takes to give one hole, or pocket, a depth or place of its own.
+    """The call of a cycle in a block of its own: the data needed to give one hole, or pocket, its own depth or place.
 
-    name       as it is written
-    arguments  their values when it was called; None where one is left out
-    depths     (place, sense): the arguments that say how deep the hole is, 1 for heights, -1 for ways down
-    across     the letter of the axis along which it drills
-    modal      it stands before the motion to the hole, and holds for others, too; else it drills where the axes stand
-    fixed      why no other call may be written in its place, or beside it; empty: it may
-    bound      an argument is known only at run time: the depth stays as the program has it
-    points     (place, letter): the arguments that are coordinates of where it works; empty: where the axes stand
-    led        letters of axes that other blocks lead to where it works: those of a contour
+    name       as written
+    arguments  values at the time of the call; None for an omitted one
+    depths     (index, sense) of the arguments that define the depth: sense 1 for heights, -1 for distances downwards
+    across     letter of the drilling axis
+    modal      the call stands before the motions to its holes and stays in force; else it drills where the axes stand
+    fixed      why the call must not be replaced or supplemented by another; empty if it may
+    bound      an argument is known only at run time: the depth stays as programmed
+    points     (index, letter) of arguments that are coordinates of its place; empty: it works where the axes stand
+    led        letters of axes that other blocks move to its place: those of a contour
     """
 
     name: str
@@ -137,59 +137,59 @@ class CycleCall:
 
 @frozen
 class Moves:
-    """The motions of a program, struct of arrays; n rows, one per motion, in order of execution.
+    """The motions of a program as a struct of arrays; n rows, one per motion, in order of execution.
 
-    axes         names of the columns of positions, e.g. ("X", "Y", "Z", "B", "C")
+    axes         names of the position columns, e.g. ("X", "Y", "Z", "B", "C")
     rotary       (n_axes,) which of them are rotary
     start, end   (n, n_axes) commands in mm and rad; NaN where not known. A rapid that may be corrected has a known
-                 end, but its start need not be; other motions that may be corrected have both
-    programmed   (n, n_axes) True where the block has a word for the axis
+                 end, but perhaps no known start; other motions that may be corrected have both
+    programmed   (n, n_axes) the block has a word for the axis
     kind         (n,) `MotionKind`
     rule         (n,) `Rule`
     reason       (n,) index into `reasons`; 0 is the empty reason
     block        (n,) index of the block in the program
     frame        (n,) index into `frames`
     incremental  (n,) the block's words are increments (G91)
-    arc_absolute (n,) the centre of an arc is given absolutely (G90.1)
+    arc_absolute (n,) the centre of an arc is given in absolute coordinates (G90.1)
     tcp          (n,) X Y Z are tool-tip coordinates in the workpiece
-    compensated  (n,) cutter radius compensation is active (G41/G42): the control offsets the contour
-    tool         (n,) number of the tool whose length that is: of the active length offset, else in the spindle
+    compensated  (n,) cutter radius compensation (G41/G42) is active, or the motion must not be split otherwise
+    tool         (n,) number of the tool of `tool_length`: of the active length offset, else of the tool in the spindle
     tool_length  (n,) mm, spindle reference to tip; NaN where not known
-    feed         (n,) mm/min, 1/min or mm/rev according to `feed_mode`; NaN where none is set, in mm
+    feed         (n,) mm/min, 1/min or mm/rev according to `feed_mode`, always in mm; NaN where none is set
     feed_mode    (n,) `FeedMode`
     centre       (n, 3) of arcs: centre in command coordinates (mm), NaN elsewhere
     normal       (n, 3) of arcs: unit normal of the plane; the sweep is right-handed about it
     sweep        (n,) of arcs: signed angle, full turns included, rad
-    modal        (n,) of straight moves and arcs: the motion G code in tenths (0, 10, 20, 30) in force
-    frames       the frames that occur
-    reasons      the reasons that occur
-    rotary_as_programmed  (n,) rotary axes must stay so: linear axes would not follow them (a swivelled plane without
-                 tool-centre-point control); None: nowhere
-    pointing     how rotary axes point the tool, where programs give its direction as a vector
-    approach     (n, n_axes) of canned cycles: the command over the hole at the level R from which it feeds, and to
-                 which it may return; NaN elsewhere and where such a level is not a word of the block's. None: nowhere
-    placed       (n, n_axes) the program itself has brought the axis to where it stands, in the coordinates in force:
-                 only then may it get a word that its block lacks (see `Places`). None: all are
-    fixed_centre (n,) of arcs: a word says where the centre is, not how far from the start. None: where `arc_absolute`
-    counted      (n, n_axes) where words are increments for some axes of a block only. None: as `incremental` says
-    resting      (n, n_axes) axes that stay where they stand, whatever words say (see `control.control`), or that have
-                 no words in such a block: rotary axes in many cycles. None: none
-    beside       (n,) radius by which the control offsets the contour to the left of the way, mm: negative to the right,
-                 NaN where it is not known, 0 where nothing is offset. None: nowhere
-    across       (n,) which of X Y Z of the program is normal to the plane of such contours. None: nothing is offset
-    passing      (n,) the rule by which a motion passes (`Pass`). None: none does, or nobody says by which
-    measured     (n, n_axes) axes whose words are computed from what the machine has measured itself: `end` is nominal,
-                 and the words stay as they are, since what was measured has the machine's error in it. None: none
-    angles       (n_axes, 2) smallest and largest angle, rad, to which plain words lead rotary axes that a control
-                 may count from 0 to 360 degrees; NaN for others. None: none
-    call         (n,) of canned cycles whose depth stands in a call of its own: index into `calls`; -1 of others.
-                 None: of none
-    calls        the calls that occur
-    spelled      (n, n_axes) axes that get a word even if they stand where it would lead them. None: none
-    tcp_length   (n,) mm, the length by which the control leads X Y Z under TCP, where that is not the tool's: zero
-                 while none is in force, so that it leads the spindle reference, not the tip; else NaN. None: nowhere
-    exact_stop   (n,) the control comes to a stop at the end of every motion (G60, G61). None: nowhere
-    words_alone_turn  (n,) rotary axes get a word only if the motion has one for some of them. None: nowhere
+    modal        (n,) of straight moves and arcs: the motion G code in force, in tenths (0, 10, 20, 30)
+    frames       all frames in use
+    reasons      all reasons in use
+    rotary_as_programmed  (n,) rotary axes must stay as programmed: linear axes would not follow them (a swivelled plane
+                 without tool-centre-point control). None: nowhere
+    pointing     how the rotary axes point the tool, if programs give its direction as a vector
+    approach     (n, n_axes) of canned cycles: the command over the hole at level R, from which it feeds and to which it
+                 may return; NaN elsewhere, and if no word of the block gives such a level. None: nowhere
+    placed       (n, n_axes) the program itself has positioned the axis, in the coordinates in force: only then may it
+                 get a word that its block lacks (see `Places`). None: everywhere
+    fixed_centre (n,) of arcs: a word gives the centre itself, not its distance from the start. None: where
+    `arc_absolute`
+    counted      (n, n_axes) words of the axis are increments, if that differs within a block. None: as `incremental`
+    resting      (n, n_axes) axes that must stay at rest whatever the words say (see `control.control`), or that cannot
+                 have words in the block: rotary axes in many cycles. None: nowhere
+    beside       (n,) offset of a compensated contour to the left of the path, mm: negative to the right, NaN if not
+                 known, 0 without compensation. None: nowhere
+    across       (n,) index (X Y Z of the program) of the normal to the plane of such contours. None: nowhere
+    passing      (n,) the rule by which a motion passes (`Pass`). None: no motion passes, or the rule is not recorded
+    measured     (n, n_axes) axes whose words are computed from measured values: `end` is nominal, and the words stay
+                 unchanged, because the measured values contain the machine's error. None: nowhere
+    angles       (n_axes, 2) smallest and largest angle, rad, of absolute words for rotary axes that the control may
+                 count from 0 to 360 degrees; NaN for other axes. None: no such axes
+    call         (n,) of canned cycles whose depth is in the block of a call: index into `calls`, else -1. None: nowhere
+    calls        all such calls
+    spelled      (n, n_axes) axes that get a word even if it would not move them. None: nowhere
+    tcp_length   (n,) mm, the length the control uses for X Y Z under TCP, if that is not the tool's: zero while no
+                 length offset is in force, so that it moves the spindle reference, not the tip; else NaN. None: nowhere
+    exact_stop   (n,) the control stops at the end of every motion (G60, G61). None: nowhere
+    words_alone_turn  (n,) rotary axes get a word only if the block has a word for one of them. None: nowhere
     """
 
     axes: tuple[str, ...]
@@ -240,20 +240,20 @@ class Moves:
 
     @property
     def length_under_tcp(self) -> Array:
-        """(n,) mm, the length of tool that the control has X Y Z of under TCP."""
+        """(n,) mm, the tool length to which X Y Z refer under TCP."""
         own = self.tcp_length
         return self.tool_length if own is None else np.where(np.isnan(own), self.tool_length, own)
 
     @property
     def beside_tip(self) -> Mask:
-        """(n,) X Y Z are those of another point than the tip, though TCP is on."""
+        """(n,) whether X Y Z refer to a point other than the tip, although TCP is on."""
         return np.zeros(len(self), dtype=bool) if self.tcp_length is None else self.tcp & ~np.isnan(self.tcp_length)
 
     @property
     def wordless(self) -> Mask:
-        """(n, n_axes) axes that have no word, and must get none: nobody knows but the machine where they stand.
+        """(n, n_axes) axes that must not be moved by a word: the program has not placed them, or they must rest.
 
-        Those that rest have one, which must lead them nowhere else.
+        An axis that must rest may have a word, which must keep its position.
         """
         wordless: Mask = np.zeros(self.end.shape, dtype=bool)
         if self.placed is not None:
@@ -262,7 +262,7 @@ class Moves:
 
     @property
     def idle(self) -> Mask:
-        """(n, n_axes) axes that no correction moves: those without words, and rotary axes that get none here."""
+        """(n, n_axes) axes that no correction can move: `wordless` ones, and rotary axes that get no words here."""
         if self.words_alone_turn is None:
             return self.wordless
         rests = self.words_alone_turn & ~self.programmed[:, self.rotary].any(axis=1)
@@ -270,23 +270,23 @@ class Moves:
 
     @property
     def increments(self) -> Mask:
-        """(n, n_axes) axes along which a motion makes the same way wherever it starts."""
+        """(n, n_axes) axes along which the displacement does not depend on where the motion starts."""
         counted = self.incremental[:, None] if self.counted is None else self.counted
         return np.broadcast_to(counted & (self.rule != Rule.PASS)[:, None], self.end.shape)
 
     @property
     def about_fixed_point(self) -> Mask:
-        """(n,) arcs whose centre is where a word says, wherever they start."""
+        """(n,) arcs whose centre is given by words, wherever they start."""
         if self.fixed_centre is None:
             return self.arc_absolute
         return self.arc_absolute | self.fixed_centre
 
     def call_of(self, row: int) -> CycleCall | None:
-        """The call with which the cycle of a motion is called, if that has a block of its own."""
+        """The cycle call that a motion belongs to, if the call has a block of its own; else None."""
         return None if self.call is None or self.call[row] < 0 else self.calls[self.call[row]]
 
     def refused(self, rows: Mask, why: str) -> Moves:
-        """The motions with those of `rows` (n,) refused that would be corrected."""
+        """The motions with `rows` (n,) refused, as far as they would have been corrected."""
         rows = rows & (self.rule == Rule.CORRECT)
         if not rows.any():
             return self
@@ -297,12 +297,12 @@ class Moves:
 
     @property
     def cutting(self) -> Mask:
-        """(n,) motions at feed: straight ones, arcs and canned cycles, but for what is passed by rule."""
+        """(n,) motions at feed (straight, arc or canned cycle) that are not passed by rule."""
         return (self.kind != MotionKind.RAPID) & (self.kind != MotionKind.DWELL) & (self.rule != Rule.PASS)
 
     @property
     def moved(self) -> Mask:
-        """(n, n_axes) axes that a motion takes to its end; a reference point without words takes all of them."""
+        """(n, n_axes) axes that a motion moves or names; one to a reference point without words moves all."""
         moved: Mask = self.programmed | (self.end != self.start)
         passed = np.flatnonzero((self.rule == Rule.PASS) & (self.kind != MotionKind.DWELL))
         moved[passed[~self.programmed[passed].any(axis=1)]] = True
@@ -311,20 +311,20 @@ class Moves:
 
 @frozen
 class Trace:
-    """A program followed as the control would: its motions and what there is to say about them."""
+    """Result of following a program: its motions and the messages about it."""
 
     moves: Moves
     messages: tuple[Message, ...] = ()
     assumed: tuple[str, ...] = ()
-    """What was not given and was taken as zero (`assume_zero`), in words, e.g. "work offset G54"."""
+    """Names of missing data taken as zero (`assume_zero`), e.g. `work offset G54`."""
     stamp: str = ""
     """The text of the stamp comment if the program carries one."""
     switches: frozenset[int] = frozenset()
-    """The switches of block delete that were asked: blocks with `/`, `/2`, ... stand where the control got to."""
+    """Numbers of the block delete switches that the program's path depends on (`/`, `/2`, ...)."""
 
 
 class Pass(IntEnum):
-    """A rule by which a motion passes, as columns hold it; `NONE` for all that do not pass."""
+    """A rule by which a motion passes, as stored in columns; `NONE` for motions that do not pass."""
 
     NONE = 0
     DWELL = 1
@@ -341,12 +341,12 @@ class Pass(IntEnum):
 
 
 class PassRule(NamedTuple):
-    """What a rule may pass.
+    """The properties of a pass rule.
 
     name   in reports
-    kinds  of motions; all others are refused instead
-    cuts   at feed they may cut something, and the program is not known to cut right there
-    why    it is right to leave them alone
+    kinds  of motions that it may pass; others are refused instead
+    cuts   whether a passed motion at feed may cut, uncorrected
+    why    the reason why such motions may stay uncorrected
     """
 
     name: str
@@ -356,7 +356,7 @@ class PassRule(NamedTuple):
 
 
 class Passing(NamedTuple):
-    """Why one motion passes: the rule, and that in the words of its program."""
+    """Why a motion passes: the rule, and the reason in terms of its program."""
 
     rule: Pass
     words: str
@@ -421,20 +421,20 @@ PASS_RULES: Mapping[Pass, PassRule] = {
         "The control goes on from the corrected end of the contour (DEP); no word says where that leads.",
     ),
 }
-"""The list: nothing else may pass."""
+"""The complete list of pass rules."""
 
 
 AT_START = "where the axis {} stands when the program starts is not given"
-"""Why a position is not known at first; asked of the setup when it matters."""
+"""Why a position is unknown at first; the setup is asked for it when it matters."""
 
 UnknownAxes = dict[int, str]
-"""Letter index -> why the position of the axis is not known, with a `{}` for its letter."""
+"""Letter index -> why the position of the axis is unknown, with a `{}` for its letter."""
 
 
 class Arc(NamedTuple):
-    """The circle of an arc in command coordinates: centre (3), unit normal (3), signed sweep.
+    """The circle of an arc in command coordinates: centre (3), unit normal (3), signed sweep, rad.
 
-    fixed  a word says where its centre is, not how far that is from the start
+    fixed  a word gives the centre itself, not its distance from the start
     """
 
     centre: tuple[float, float, float]
@@ -444,14 +444,14 @@ class Arc(NamedTuple):
 
 
 class MotionEnd(NamedTuple):
-    """Where a motion ends.
+    """The end of a motion.
 
-    target      the command, of every letter; a nominal value along `unknown`
-    unknown     why an axis of the machine is not known there
-    in_frame    the same along the axes of the program's frame, where its words tell more than the axes of the machine
-                do; None: `unknown` tells all
-    in_machine  under TCP, where words mean places of the machine: the same place in axes of the machine, where all of
-                it, and where the motion starts, is known
+    target      the command of every letter; a nominal value where `unknown`
+    unknown     reasons for unknown positions of machine axes
+    in_frame    the same for the axes of the program's frame, if its words tell more than the machine axes; None:
+                `unknown` tells all
+    in_machine  under TCP, for words that are machine positions: the end as machine axis positions, if it and the start
+                are completely known
     """
 
     target: Vector
@@ -461,7 +461,7 @@ class MotionEnd(NamedTuple):
 
     @property
     def lost(self) -> UnknownAxes:
-        """What is not known along the axes of the program's frame, where that is kept for every motion."""
+        """Reasons for unknown coordinates along the axes of the program's frame."""
         return self.unknown if self.in_frame is None else self.in_frame
 
 
@@ -469,11 +469,11 @@ class Motion(NamedTuple):
     """One motion of the control.
 
     axes     axes with a word, as bits
-    end      where it ends
+    end      its end
     code     the motion code, in tenths
     refusal  why it is refused; empty if it is not
-    passing  why it is passed as it is; None if it is not
-    placed  the axes whose words say where they stand afterwards; None: those of absolute words
+    passing  why it is passed; None if it is not
+    placed   axes whose positions its words set, as bits; None: those of absolute words
     """
 
     kind: MotionKind
@@ -487,13 +487,13 @@ class Motion(NamedTuple):
 
 
 def blanked(position: Vector, unknown: UnknownAxes) -> Vector:
-    """A position with NaN where it is not known."""
+    """The position with NaN where it is unknown."""
     if not unknown:
         return position
     return [math.nan if index in unknown else value for index, value in enumerate(position)]
 
 
 def first_reason(unknown: UnknownAxes) -> str:
-    """The reason for the first axis whose position is not known."""
+    """The reason for the first axis whose position is unknown."""
     index = min(unknown)
     return unknown[index].format(LETTERS[index])

@@ -1,7 +1,7 @@
-"""What codes and drilling cycles do that a dialect adds to those of its family, as data.
+"""Codes and drilling cycles that a dialect adds to those of its family, described as data.
 
-`Dialect.derive` takes them; the interpreter of the family carries them out, so that modes, frames, unknown positions
-and the account of path words hold for them as for any other code. A code is a few operations, in order:
+They are passed to `Dialect.derive`; the interpreter of the family executes them, so that modes, frames, unknown
+positions and path words are treated as for any other code. A code is a sequence of operations:
 
     codes={
         "G100": [SetTool("T"), Rapid()],                       # change the tool, then go to the words in rapid
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from ncfix.control.control import ProgramControl
 
 ALL_AXES = LETTERS
-"""For `Lose`: all axes that the machine has."""
+"""For `Lose`: all axes of the machine."""
 MOTION = re.compile(r"G0*[0-3]|G7[346]|G8[1-9]")
-"""Codes whose words lead axes, and are rewritten."""
+"""Codes whose words position axes and are rewritten."""
 LOST = "where the axis {{}} stands after {} is not known"
 NOT_FOLLOWED = "{} is in force, which ncfix does not follow"
 AFTER = "where the axis {{}} stands after {} is not followed"
@@ -42,11 +42,11 @@ AFTER_MADE = "where the axis {} stands after motions that the control makes up i
 
 
 Destination = Callable[[], MotionEnd]
-"""Gives the place to which the axis words of a block lead."""
+"""Returns the end position that the axis words of a block define."""
 
 
 class BlockValues(Protocol):
-    """The words of a block that is executed, see `Operation.carry_out`."""
+    """The words of the block being executed, see `Operation.carry_out`."""
 
     @property
     def values(self) -> Mapping[str, float]:
@@ -54,34 +54,34 @@ class BlockValues(Protocol):
 
     @property
     def unknown(self) -> Set[str]:
-        """The addresses whose value is known only at run time."""
+        """Addresses whose value is known only at run time."""
 
     @property
     def axes(self) -> int:
-        """The axis words, as a bit mask of their letters."""
+        """The axes that have a word, as a bit mask of their letters."""
 
 
 @frozen
 class Operation(ABC):
-    """Something that a code does before the motion of its block."""
+    """One action of a code, executed before the motion of its block."""
 
     takes: ClassVar[bool] = False
-    """It takes the axis words of its block, so that these make no other motion."""
+    """Whether it uses the axis words of its block, so that they cause no other motion."""
     alone: ClassVar[bool] = False
-    """It is all that its code does: no other operation stands beside it."""
+    """Whether it must be the only operation of its code."""
 
     @abstractmethod
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
-        """Do it."""
+        """Execute the operation."""
 
 
 Given = str | float | tuple[str, float]
-"""What a word of the family's code gets: that of another address, a number, or the first, or else the second."""
+"""Source of a word of the family's code: another address, a number, or (address, number used without such a word)."""
 GIVEN = "a letter for a letter, a number, or both: (letter, number where the block has no such word)"
 
 
 def source(given: Given) -> tuple[str | None, float | None]:
-    """The address from which a word of the family's code gets its value, and its number without such a word."""
+    """The address that supplies a word of the family's code, and the number used without it; None: none."""
     if isinstance(given, tuple):
         return given if len(given) == 2 else ("", None)
     return (given, None) if isinstance(given, str) else (None, given)
@@ -89,10 +89,10 @@ def source(given: Given) -> tuple[str | None, float | None]:
 
 @frozen
 class Like(Operation):
-    """It does what a code of the family does. See `like`.
+    """Acts like a code of the family. See `like`.
 
-    words  the family's address -> the own address whose word it gets, or a fixed number, or both: a number for blocks
-           without that word
+    words  address in the family's code -> own address that supplies the word, or a fixed number, or both: the number is
+           used in blocks without that word
     """
 
     alone: ClassVar[bool] = True
@@ -115,11 +115,11 @@ class Like(Operation):
 
     @property
     def given(self) -> dict[str, tuple[str | None, float | None]]:
-        """Where the words of the family's code come from, by their addresses: see `source`."""
+        """Sources of the words of the family's code, by address: see `source`."""
         return {known: source(own) for known, own in self.words}
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
-        """The family's code stands in its place wherever blocks are read: there is nothing left to do."""
+        """Do nothing: blocks are read with the family's code in its place."""
 
     def __str__(self) -> str:
         told = []
@@ -130,9 +130,9 @@ class Like(Operation):
 
 
 def like(code: str, **words: Given) -> Like:
-    """Do what the family's `code` does.
+    """Act like the family's `code`.
 
-    `I="A"`: its I is the word A; `P=0`: its P is 0; `X=("I", 0)`: its X is the word I, and 0 in a block without I.
+    `I="A"`: its I is the word A. `P=0`: its P is 0. `X=("I", 0)`: its X is the word I, or 0 in a block without I.
     Other words stay.
     """
     return Like(code, tuple(sorted(words.items())))
@@ -140,13 +140,13 @@ def like(code: str, **words: Given) -> Like:
 
 @frozen
 class SetTool(Operation):
-    """The tool that a word names comes into the spindle, as with M6.
+    """The tool named by a word is put into the spindle, as with M6.
 
-    It does not mean that the axes go anywhere: their positions stay known, and motions after it are corrected from
-    there. It only means that no word is added for an axis until the program names that axis again. Where the code
-    leaves the axes at the place where tools are changed, `Lose` stands beside it.
+    The axes are taken to stay where they are: their positions remain known, and motions after it are corrected. But no
+    word is added for an axis until the program names that axis again. If the code leaves the axes at the tool change
+    position, add `Lose`.
 
-    address  of the word, no axis letter; without that word it is the tool that was selected last
+    address  of the tool word, not an axis letter; in a block without it, the tool selected last is used
     """
 
     address: str = "T"
@@ -168,12 +168,12 @@ class SetTool(Operation):
 
 @frozen
 class Lose(Operation):
-    """Axes go where the program does not say: motions at feed are refused until each is brought to a known place.
+    """Axes move to unknown positions: feed motions are refused until each of these axes is at a known place.
 
-    That is one that the program names in absolute or in machine coordinates, or a reference point.
+    It is known again after an absolute word, a word in machine coordinates, or a reference point.
 
-    axes   letters, linear and rotary; those that the machine lacks do not count. `ALL_AXES` for all
-    after  after what, for messages: "the tool change (G100)"
+    axes   letters, linear and rotary; those that the machine lacks are ignored. `ALL_AXES` for all
+    after  the cause, for messages: "the tool change (G100)"
     """
 
     axes: str
@@ -195,7 +195,7 @@ class Lose(Operation):
 
 @frozen
 class Rapid(Operation):
-    """The axes go to the words of the block in rapid, whatever motion code is in force."""
+    """The axes move in rapid to the words of the block, whatever motion code is in force."""
 
     takes: ClassVar[bool] = True
 
@@ -211,9 +211,9 @@ class Rapid(Operation):
 
 
 def make_up(control: ProgramControl, block: BlockValues, what: str, turned: Collection[int] = ()) -> None:
-    """A motion that the control makes up: it is refused, and leaves X Y Z and other axes where nobody knows.
+    """Add a motion that the control generates itself: it is refused, and its end position is unknown.
 
-    Those are the axes of the block, and `turned` by their letters' indices.
+    This concerns X Y Z, the axes of the block, and `turned` (letter indices).
     """
     led = (X, Y, Z, *turned)
     gone = {index for index in control.axis_indices if block.axes >> index & 1 or index in led}
@@ -223,11 +223,11 @@ def make_up(control: ProgramControl, block: BlockValues, what: str, turned: Coll
 
 @frozen
 class MakeUp(Operation):
-    """The control makes up the motion of this block, a pocket, say: it is refused, and no other is.
+    """The control generates the motion of this block, such as a pocket: it is refused, other motions are not.
 
-    X, Y, Z and the axes of the block stand where nobody knows after it, as with `Lose`.
+    The positions of X, Y, Z and of the axes of the block are unknown afterwards, as with `Lose`.
 
-    what  what it makes up, for messages: "the arc tangent to the motion before it (G8)"
+    what  the generated motion, for messages: "the arc tangent to the motion before it (G8)"
     """
 
     takes: ClassVar[bool] = True
@@ -244,11 +244,11 @@ class MakeUp(Operation):
 
 @frozen
 class SetLength(Operation):
-    """The length of the tool acts from here on, as with G43, which many controls have no code for.
+    """The tool length is in force from here on, as with G43; many controls have no code for it.
 
-    The setup says how long each tool is. Beside `SetTool` it stands behind it.
+    Tool lengths come from the setup. Together with `SetTool`, it stands after it.
 
-    address  of the word that says which tool's length it is; without that word, or with "", of the tool in the spindle
+    address  of the word with the tool's number; without that word, or with "", the tool in the spindle is meant
     """
 
     address: str = ""
@@ -270,7 +270,7 @@ class SetLength(Operation):
 
 @frozen
 class Suspend(Operation):
-    """A mode begins that ncfix does not follow: motions are refused until `Resume` of the same mode."""
+    """Begin a mode that ncfix does not follow: motions are refused until `Resume` of the same mode."""
 
     mode: str
 
@@ -284,7 +284,7 @@ class Suspend(Operation):
 
 @frozen
 class Resume(Operation):
-    """The mode ends; where it has led the axes is not known."""
+    """End a suspended mode; the axis positions are unknown afterwards."""
 
     mode: str
 
@@ -299,7 +299,7 @@ class Resume(Operation):
 
 @frozen
 class Refuse(Operation):
-    """Every motion from here on is refused, those before it are not; `why` is told for each."""
+    """Refuse every motion from here on; `why` is reported for each."""
 
     why: str
 

@@ -1,13 +1,11 @@
-"""How two rotary axes point the tool in the workpiece, found out from a machine's own kinematics, and the angles with
-which they point it along a direction.
+"""How two rotary axes orient the tool in the workpiece, and the angles at which they point it in a given direction.
 
-Whatever the chain, the direction from the tip to the spindle is `turn(outer axis) @ turn(inner axis) @ tool`: each
-rotary axis turns it about a line that is fixed in the workpiece, or that only the other axis carries. Where these lines
-lie shows in three positions of each axis.
+For any kinematic chain, the direction from the tip to the spindle is `turn(outer axis) @ turn(inner axis) @ tool`: each
+rotary axis turns it about a line that is fixed in the workpiece or carried by the other axis only. Three positions of
+each axis, asked of the machine's kinematics, determine these lines.
 
-Many directions are solved in columns with the same operations in the same order as one, so that the results are the
-same to the last bit: the functions of the standard library are called on number after number, since numpy's may round
-otherwise.
+Many directions are solved in columns by the same operations in the same order as a single one, so that the results are
+identical to the last bit: the functions of `math` are called number by number, since numpy's may round differently.
 """
 
 from __future__ import annotations
@@ -25,25 +23,25 @@ from ncfix.values import frozen
 Columns = tuple[Array, Array, Array]
 
 Ways = tuple[tuple[float, float], tuple[float, float]]
-"""Two ways to point the tool, of which `nearest` takes one: angles of outer and inner axis, rad."""
+"""The two solutions for a tool direction, among which `nearest` chooses: angles of outer and inner axis, rad."""
 
 Directions = Callable[[float, float], Array]
-"""Angles of the two rotary axes, rad -> the unit vector (3,) from the tip to the spindle in the workpiece."""
+"""Angles of the two rotary axes, rad -> unit vector (3,) from the tip to the spindle in the workpiece."""
 
 PROBES = (0.0, 0.7, 1.3, -0.9)
-"""Positions of one axis at which the other is tried: in some the tool may lie along its line."""
+"""Angles, rad, of one axis at which the line of the other is sought; at some the tool may lie along that line."""
 
 LEAST = 1e-3
-"""A smaller circle, relative to the tool's length, says nothing about its axis."""
+"""Smallest radius of the tool's circle about an axis, relative to its length, from which the line can be determined."""
 
 
 @frozen
 class Pointing:
-    """How a machine with two rotary axes points its tool.
+    """Orientation of the tool by the two rotary axes of a machine.
 
-    columns  of the outer axis (its line is fixed in the workpiece) and of the inner one, in positions
-    lines    unit vectors: of the outer line, of the inner one with the outer axis at zero, both right-handed; and the
-             direction of the tool with both at zero
+    columns  position columns of the outer axis (its line is fixed in the workpiece) and of the inner axis
+    lines    unit vectors: the outer line, the inner line with the outer axis at zero, both right-handed; and the
+             direction of the tool with both axes at zero
     """
 
     columns: tuple[int, int]
@@ -51,7 +49,7 @@ class Pointing:
 
     @classmethod
     def of(cls, columns: tuple[int, int], directions: Directions) -> Pointing | None:
-        """From the directions that a machine gives; None if they are not those of two turns."""
+        """Determine it from a machine's directions; None if two successive rotations cannot produce them."""
         swapped = _swapped(directions)
         for pair, ask in ((columns, directions), (columns[::-1], swapped)):
             outer, inner = _line(ask), _line(_swapped(ask), (0.0,))
@@ -63,17 +61,17 @@ class Pointing:
         return None
 
     def at(self, outer: float, inner: float) -> Array:
-        """The direction (3,) at these angles, rad."""
+        """The tool direction (3,) at these angles, rad."""
         return np.array(turned(self.lines[0], outer, turned(self.lines[1], inner, self.lines[2], to_one), to_one))
 
     def direction(self, position: Array) -> Array:
-        """The direction (3,) at a position (n_axes,), rad."""
+        """The tool direction (3,) at a position (n_axes,), mm and rad."""
         return self.at(float(position[self.columns[0]]), float(position[self.columns[1]]))
 
     def angles(self, direction: Array, near: tuple[float, float]) -> list[tuple[float, float]]:
-        """The angles of outer and inner axis, rad, with which the tool points along a unit vector.
+        """Angles of outer and inner axis, rad, at which the tool points along a unit vector; empty if it cannot.
 
-        Nearest to `near` first; an axis that may stand anywhere stands there. Empty if the machine cannot point there.
+        The solution nearest to `near` comes first; an axis whose angle does not matter takes that of `near`.
         """
         beyond, ways = solve(self.lines, _triple(direction), to_one)
         if beyond > 0:
@@ -82,22 +80,22 @@ class Pointing:
         return [first] if first == second else [first, second]
 
     def ways_of_many(self, directions: Columns) -> tuple[Mask, list[Ways]]:
-        """Whether the machine can point along unit vectors, three columns (n,), and the two `Ways` to do it."""
+        """For unit vectors in three columns (n,): whether the machine can point along each, and its two `Ways`."""
         outer, inner, tool = ((np.array(x), np.array(y), np.array(z)) for x, y, z in self.lines)
         beyond, ways = solve((outer, inner, tool), directions, to_each)
         first, second = (zip(one.tolist(), other.tolist(), strict=True) for one, other in ways)
         return beyond <= 0, list(zip(first, second, strict=True))
 
     def at_pole(self, direction: Array) -> bool:
-        """Whether a tool along the unit vector `direction` (3,) would stand along the line of the outer axis."""
+        """Whether a tool along the unit vector `direction` (3,) is parallel to the line of the outer axis."""
         return math.hypot(*cross(self.lines[0], _triple(direction))) < POLE
 
     def leaves_pole(self, here: Pair, ways: Sequence[Pair]) -> bool:
-        """Whether the tool stands along the outer axis and is to leave it, so that either way would be as near."""
+        """Whether the tool is to leave a pole, where it is parallel to the outer axis: then neither way is nearer."""
         return len({*ways}) > 1 and self.at_pole(self.at(*here)) and not self.at_pole(self.at(*ways[0]))
 
     def stray(self, start: tuple[float, float], stop: tuple[float, float]) -> float:
-        """How far half-way the plane between two directions is from the direction at the mean angles, rad."""
+        """Angle, rad, between the tool at the mean axis angles and the middle of the plane arc between the ends."""
         middle = self.at((start[0] + stop[0]) / 2, (start[1] + stop[1]) / 2)
         half = self.at(*start) + self.at(*stop)
         size = float(np.linalg.norm(half))
@@ -114,7 +112,7 @@ def _triple(vector: Array) -> Triple:
 
 
 def _line(directions: Directions, probes: tuple[float, ...] = PROBES) -> Array | None:
-    """The line about which the first angle turns, the same wherever the second stands; None if it is not."""
+    """The line about which the first axis turns; None if it depends on the angle of the second."""
     lines = [line for probe in probes if (line := _line_at(directions, probe)) is not None]
     if not lines or any(np.abs(line - lines[0]).max() > SAME for line in lines):
         return None
@@ -129,7 +127,7 @@ def _line_at(directions: Directions, second: float) -> Array | None:
 
 
 Number = TypeVar("Number", float, Array)
-"""A number, or a column of them (n,), one per direction."""
+"""A number, or a column (n,) with one number per direction."""
 
 Vector = tuple[Number, Number, Number]
 Triple = tuple[float, float, float]
@@ -137,23 +135,23 @@ Pair = tuple[float, float]
 
 SAME = 1e-9
 POLE = 1e-7
-"""rad; nearer to the outer axis than that the tool may turn about it at will."""
+"""Smallest angle, rad, between tool and outer axis; below it the angle of the outer axis is free."""
 
 
 class Apply(Protocol[Number]):
-    """Calls a function of numbers with numbers, or with columns row by row."""
+    """Applies a function of numbers to numbers, or to columns row by row."""
 
     def __call__(self, function: Callable[..., float], *values: Number) -> Number:
-        """What the function returns."""
+        """The results of the function."""
 
 
 def to_one(function: Callable[..., float], *values: float) -> float:
-    """Apply a function to numbers."""
+    """Call a function with numbers."""
     return function(*values)
 
 
 def to_each(function: Callable[..., float], *values: Array) -> Array:
-    """Apply a function of numbers to columns of one shape."""
+    """Call a function of numbers for each row of columns of one shape."""
     found = list(map(function, *(each.ravel().tolist() for each in values)))
     return np.array(found, dtype=np.float64).reshape(values[0].shape)
 
@@ -161,12 +159,12 @@ def to_each(function: Callable[..., float], *values: Array) -> Array:
 def solve(
     lines: tuple[Vector[Number], Vector[Number], Vector[Number]], wanted: Vector[Number], apply: Apply[Number]
 ) -> tuple[Number, tuple[tuple[Number, Number], tuple[Number, Number]]]:
-    """How far a unit vector is beyond what two axes reach, and the two ways to point the tool along it, rad.
+    """The two ways to point the tool along a unit vector, rad, and by how much it is out of reach.
 
-    lines  of the outer axis, of the inner one, and the direction of the tool, see `Pointing`
+    lines  the outer line, the inner line, and the tool direction, see `Pointing`
 
-    A direction is reached where the first number is not above zero; a way is an angle of the outer axis, NaN where it
-    may stand anywhere, and one of the inner, less than two turns from zero.
+    The direction can be reached if the first number is not above zero. A way is the angle of the outer axis (NaN if any
+    angle will do) and of the inner axis, less than two turns from zero.
     """
     outer, inner, tool = lines
     share = dot(inner, tool)
@@ -183,7 +181,7 @@ def solve(
 
 
 def nearest(ways: tuple[Pair, Pair], near: Pair) -> tuple[Pair, Pair]:
-    """The ways that `solve` found, led to the whole turns nearest to where the axes stand, rad; the nearer first."""
+    """The solutions of `solve`, changed by whole turns to be nearest to the angles `near`, rad; nearer one first."""
     (outer, inner), (other, another) = ways
     here, there = near
     one = nearest_turn(outer, here), nearest_turn(inner, there)
@@ -193,9 +191,9 @@ def nearest(ways: tuple[Pair, Pair], near: Pair) -> tuple[Pair, Pair]:
 
 
 def nearest_turn(angle: float, near: float) -> float:
-    """An angle, whole turns away if need be, at most half a turn from another, rad; the other itself for NaN.
+    """The angle, changed by whole turns to be within half a turn of `near`, rad; `near` itself for NaN.
 
-    Just half a turn away it is the lower one.
+    Of two such angles, exactly half a turn away on both sides, the lower one.
     """
     return angle + TURN * math.ceil((near - angle) / TURN - 0.5) if angle == angle else near
 
@@ -211,13 +209,13 @@ def cross(a: Vector[Number], b: Vector[Number]) -> Vector[Number]:
 
 
 def across(axis: Vector[Number], vector: Vector[Number]) -> Vector[Number]:
-    """What of a vector is square to an axis."""
+    """The component of a vector perpendicular to an axis."""
     along = dot(axis, vector)
     return vector[0] - along * axis[0], vector[1] - along * axis[1], vector[2] - along * axis[2]
 
 
 def turned(axis: Vector[Number], angle: Number, vector: Vector[Number], apply: Apply[Number]) -> Vector[Number]:
-    """A vector turned about an axis."""
+    """A vector turned about an axis by an angle, rad."""
     along, (u, v, w) = dot(axis, vector), cross(axis, vector)
     c, s = apply(math.cos, angle), apply(math.sin, angle)
     rest = 1 - c
@@ -229,7 +227,7 @@ def turned(axis: Vector[Number], angle: Number, vector: Vector[Number], apply: A
 
 
 def _outer_angle(outer: Vector[Number], start: Vector[Number], stop: Vector[Number], apply: Apply[Number]) -> Number:
-    """By how much the outer axis turns one vector square to it into another; NaN if one of them is too short."""
+    """The angle, rad, by which the outer axis turns one perpendicular vector into another; NaN if one is too short."""
     sine, cosine = dot(outer, cross(start, stop)), dot(start, stop)
     return apply(_angle, sine, cosine, dot(start, start), dot(stop, stop))
 

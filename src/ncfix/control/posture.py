@@ -1,11 +1,11 @@
-"""The posture of a machine: where tool and axes point in the workpiece, and to which rotary positions a control goes
-for a direction of the tool (PLANE, CYCLE800, G53.1, vectors under TRAORI, M128 and G43.5).
+"""The directions of tool and axes in the workpiece, and the rotary positions a control takes for a tool direction
+(PLANE, CYCLE800, G53.1, vectors under TRAORI, M128 and G43.5).
 
-The machine's own kinematics tell all of it. They say where the tip of a tool of any length is in the workpiece: the tip
-of a longer tool less that of a shorter one is the direction of the tool, the tip with an axis moved less the tip
-without is the direction of that axis.
+All of it follows from the machine's kinematics, which give the tip of a tool of any length in the workpiece: the tip of
+a longer tool minus that of a shorter one is the tool direction; the tip with an axis moved minus the tip without is the
+direction of that axis.
 
-Mostly there are two ways to point the tool. By which rules a control takes one of them is data (`WayRules`).
+There are usually two ways to point the tool. `WayRules` describe which one a control takes.
 """
 
 from __future__ import annotations
@@ -24,31 +24,32 @@ from ncfix.control.pointing import Pair, Pointing, Triple
 from ncfix.values import frozen
 
 PROBE = 128.0
-"""mm, the length of the tool that shows its direction; a power of two, so that dividing by it rounds nothing."""
+"""Tool length, mm, used to find the tool direction; a power of two, so that dividing by it is exact."""
 
 SQUARE = 2e-4
-"""A tool closer to a direction than this, rad, is taken to lie along it: rotary words have three decimals of a degree,
-9e-6 rad each."""
+"""Largest angle, rad, between tool and a direction that it is taken to lie along: rotary words have three decimals of
+a degree, 9e-6 rad each."""
 
 FAR = math.radians(0.1)
-"""rad. Between two directions a control may turn the tool in their plane, or its rotary axes evenly. The tip is not
-concerned; where the two differ by more, pieces of the motion would point the tool elsewhere than the whole."""
+"""Largest deviation, rad, between turning the tool in a plane and turning its rotary axes evenly. A control may do
+either. The tip is not affected; but beyond this, pieces of a motion would orient the tool differently from the
+whole."""
 
 AT_END = 1e-6
-"""rad; so far past its travel an axis is still at the end of it."""
+"""Largest overrun of its travel, rad, at which an axis still counts as at its end."""
 
 AT_ZERO = 1e-9
-"""rad; an axis that is nearer to zero stands on neither side of it."""
+"""Smallest distance from zero, rad, at which an axis has a sign."""
 
 TURNS = 2
 
 
 class WayRules(NamedTuple):
-    """By what a control chooses among the ways to point its tool; the nearest where nothing else is said.
+    """The rules by which a control chooses among the ways to point its tool; by default the nearest.
 
-    in_travel  only ways within the travels of both axes, whole turns away if need be
-    sign       the inner axis, which tilts the tool, stands at or above zero (1), or at or below (-1): SEQ+, SEQ-
-    sense      the way with the greater (1) or the lesser (-1) angle of the inner axis, within half a turn: _DIR
+    in_travel  only ways within the travels of both axes, changed by whole turns if necessary
+    sign       the inner (tilting) axis must be at or above zero (1), or at or below (-1): SEQ+, SEQ-
+    sense      the way with the larger (1) or smaller (-1) angle of the inner axis, within half a turn: _DIR
     """
 
     in_travel: bool = False
@@ -61,12 +62,12 @@ NEAREST = WayRules()
 
 @frozen
 class Postures:
-    """The ways of two rotary axes to point the tool along a direction.
+    """The ways of two rotary axes to point the tool in a direction.
 
-    letters  letter indices of the outer axis and of the inner one
-    here     where they stand, rad
-    ways     where they may go, rad, that which the control takes first; empty if it cannot point the tool there
-    at_pole  the tool lies along the outer axis then, which may stand anywhere
+    letters  letter indices of the outer and the inner axis
+    here     their current angles, rad
+    ways     possible angles, rad, the one that the control takes first; empty if the tool cannot point there
+    at_pole  the tool is then parallel to the outer axis, whose angle is free
     """
 
     pointing: Pointing
@@ -77,30 +78,30 @@ class Postures:
 
     @property
     def chosen(self) -> dict[int, float]:
-        """Letter index -> where the axis goes, rad; empty if the tool cannot point there."""
+        """Letter index -> angle that the axis takes, rad; empty if the tool cannot point there."""
         return dict(zip(self.letters, self.ways[0], strict=True)) if self.ways else {}
 
     @property
     def leaves_pole(self) -> bool:
-        """Whether the tool stands along the outer axis and is to leave it, so that either way would be as near."""
+        """Whether the tool is to leave a pole, where it is parallel to the outer axis: then neither way is nearer."""
         return self.pointing.leaves_pole(self.here, self.ways)
 
     @property
     def strays(self) -> bool:
-        """Whether the tool, if its axes turn evenly, leaves the plane between the two directions."""
+        """Whether evenly turning axes move the tool out of the plane between the two directions."""
         return self.pointing.stray(self.here, self.ways[0]) > FAR
 
     def __str__(self) -> str:
-        """Where the axes go, as people write it: `B30.000 C120.000`."""
+        """The angles that the axes take, as programs write them: `B30.000 C120.000`."""
         return angles_in_words(self.letters, self.ways[0])
 
 
 @frozen
 class MachineDirections:
-    """Directions in the workpiece, with the rotary axes at some positions.
+    """Directions in the workpiece at some position of the rotary axes.
 
     tool  unit vector from the tip to the spindle
-    axes  of the machine's X, Y and Z, as columns of a rotation
+    axes  directions of the machine's X, Y and Z, as columns of a rotation
     """
 
     tool: Triple
@@ -108,10 +109,10 @@ class MachineDirections:
 
 
 class MachinePosture:
-    """Where a machine points its tool and its axes, as its kinematics tell.
+    """Directions of a machine's tool and axes in the workpiece, from its kinematics.
 
-    kinematics  None: nobody knows them
-    machine     letter indices of the machine's axes, in the order of its columns; `rotary`: whether each letter turns
+    kinematics  None: not known
+    machine     letter indices of the machine's axes, in column order; `rotary`: whether each letter is a rotary axis
     """
 
     def __init__(self, kinematics: Kinematics | None, machine: tuple[int, ...], rotary: Sequence[bool]) -> None:
@@ -120,9 +121,9 @@ class MachinePosture:
 
     @cached_property
     def pointing(self) -> Pointing | None:
-        """How the two rotary axes point the tool: the tips of two tool lengths say which way it points.
+        """How the two rotary axes point the tool, determined from the tips of two tool lengths.
 
-        None if the machine has others, if it lacks X, Y or Z, or if nobody knows its kinematics.
+        None if the machine has more or fewer rotary axes, lacks X, Y or Z, or if its kinematics are not known.
         """
         turning = [index for index in self.axis_indices if self.rotary[index]]
         if self.kinematics is None or len(turning) != 2 or not {X, Y, Z} <= {*self.axis_indices}:
@@ -136,9 +137,9 @@ class MachinePosture:
         return Pointing.of((self.axis_indices.index(turning[0]), self.axis_indices.index(turning[1])), directions)
 
     def postures(self, direction: Sequence[float], rules: WayRules, here: Pair) -> Postures | None:
-        """The ways to point the tool along a unit vector in the workpiece, from where the two rotary axes stand.
+        """The ways to point the tool along a unit vector in the workpiece, with the two rotary axes now at `here`, rad.
 
-        None where the kinematics are not known, or those of two rotary axes.
+        None if the kinematics are not known or are not those of two rotary axes.
         """
         pointing = self.pointing
         if pointing is None:
@@ -157,9 +158,9 @@ class MachinePosture:
         return Postures(pointing, (self.axis_indices[outer], self.axis_indices[inner]), here, ways, at_pole)
 
     def only_posture(self, direction: Sequence[float], rules: WayRules) -> Postures | None:
-        """The way to point the tool along a unit vector from wherever the axes may stand.
+        """The way to point the tool along a unit vector if it does not depend on where the axes stand.
 
-        None unless travels leave one way, to the whole turn.
+        None unless the travels leave exactly one way, whole turns included.
         """
         if self.kinematics is None or self.pointing is None or not rules.in_travel:
             return None
@@ -170,7 +171,7 @@ class MachinePosture:
         return one if one and other and one.ways == other.ways and len(one.ways) == 1 else None
 
     def directions(self, position: Vector) -> MachineDirections | None:
-        """How the machine stands with its rotary axes at these positions; None if nobody knows its kinematics."""
+        """Directions of tool and axes with the rotary axes at `position`, rad; None if the kinematics are not known."""
         if self.kinematics is None or not {X, Y, Z} <= {*self.axis_indices}:
             return None
         still = [value if self.rotary[index] else 0.0 for index, value in enumerate(position)]
@@ -187,7 +188,7 @@ class MachinePosture:
         return self._directions[1]
 
     def _tip(self, position: Vector, length: float) -> Array:
-        """The tip (3,) of a tool of some length in the workpiece, mm."""
+        """Tip (3,) of a tool of length `length` in the workpiece, mm."""
         assert self.kinematics is not None
         command = [position[index] for index in self.axis_indices]
         found = self.kinematics(command, TcpState(False, length), TcpState(True, length))
@@ -195,7 +196,7 @@ class MachinePosture:
 
 
 def within(ways: Iterable[Pair], travel: Sequence[Pair], near: Pair) -> list[Pair]:
-    """The ways that two axes can go within their travels, whole turns away if need be; the nearest first."""
+    """The ways within the travels of both axes, changed by whole turns if necessary; the nearest to `near` first."""
     found = []
     for way in ways:
         places = [_in_travel(angle, *span, to) for angle, span, to in zip(way, travel, near, strict=True)]
@@ -205,7 +206,7 @@ def within(ways: Iterable[Pair], travel: Sequence[Pair], near: Pair) -> list[Pai
 
 
 def _in_travel(angle: float, low: float, high: float, near: float) -> float | None:
-    """An angle, or whole turns away from it, within a travel and nearest to another; None if none is."""
+    """The angle, changed by whole turns to be within a travel and nearest to `near`; None if there is none."""
     turns = (angle + 2 * math.pi * count for count in range(-TURNS, TURNS + 1))
     possible = [each for each in turns if low - AT_END <= each <= high + AT_END]
     return min(possible, key=lambda each: abs(each - near), default=None)
@@ -217,7 +218,7 @@ def normal_of(frame: Rotation) -> Triple:
 
 
 def _unit(vector: Array) -> list[float]:
-    """A vector as one of length one."""
+    """The unit vector along a vector."""
     parts: list[float] = vector.tolist()
     size = math.hypot(*parts)
     return [part / size for part in parts]

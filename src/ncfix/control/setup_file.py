@@ -1,4 +1,4 @@
-"""The setup file (TOML): work offsets, tool lengths, start position and the rest that a program cannot know."""
+"""The setup file (TOML): work offsets, tool lengths, start position and other data that a program cannot contain."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ WRONG_VALUE = "NCF383"
 CODES = KeyCodes(UNKNOWN_KEY, *4 * (WRONG_VALUE,))
 
 SYSTEM = re.compile(r"G5[4-9]|G59\.[1-3]|G54\.1P\d+|G500|G5(?:0[5-9]|[1-9]\d)|PRESET\d*")
-"""Names of work offsets: G54 to G59.3, G54.1 P1 and so on; those of SINUMERIK, G500, G505 to G599; and of the TNC:
-PRESET, the one that is active when the program starts, PRESET1 and so on."""
+"""Names of work offsets: G54 to G59.3, G54.1P1 and so on; of SINUMERIK G500, G505 to G599; of the TNC PRESET (the one
+active when the program starts), PRESET1 and so on."""
 
 VARIABLE = re.compile(r"#\d+|#<[^<>]*>|[A-Z_$][A-Z\d_$]*(?:\[[-\d, ]+\])?")
-"""Parameters and variables: of RS274 and Fanuc with #, of other controls in upper case (R1, Q5, _DEPTH, LIST[2])."""
+"""Names of variables: with # for RS274 and Fanuc, in upper case for other controls (R1, Q5, _DEPTH, LIST[2])."""
 
 G_CODE = re.compile(r"G(\d{1,4})(?:\.(\d))?")
-"""A G code as a program has it."""
+"""A G code as written in a program."""
 
 TOOL = re.compile(r"\d{1,9}$|(?!T\d+$|\d+$).{2,}")
-"""A tool is called by its number or by a name."""
+"""A tool number or a tool name."""
 
 
 def load(path: str) -> Setup:
-    """The setup in a file. Raises SourceError NCF002, ConfigError NCF38x with all that is wrong in it."""
+    """Read a setup file. Raises SourceError NCF002, or ConfigError NCF38x with everything that is wrong in it."""
     return loads(decoded(read_bytes(path, MOST_SAID), path, NOT_TOML), path)
 
 
 def loads(text: str, path: str = "<setup>") -> Setup:
-    """The setup in a text; raises ConfigError NCF38x with all that is wrong in it."""
+    """The setup described by a text; raises ConfigError NCF38x with everything that is wrong in it."""
     content = parsed(text, path, NOT_TOML, "docs/formats.md shows a setup file")
     if "topology" in content:
         raise ConfigError.of(UNKNOWN_KEY, "this is a machine file, not a setup file", Place(path), "-m is for machines")
@@ -60,7 +60,7 @@ def loads(text: str, path: str = "<setup>") -> Setup:
 def _each(
     pattern: re.Pattern[str], wrong: str, hint: str, reader: Callable[[TomlTable, str], Any]
 ) -> Callable[[TomlTable, str], dict[str, Any]]:
-    """A reader of a table whose values are all of one kind; `wrong` is said of a name that cannot be."""
+    """A reader of a table whose values are all read by `reader`; `wrong`: message for a name that is not allowed."""
 
     def read(root: TomlTable, key: str) -> dict[str, Any]:
         found = {}
@@ -98,7 +98,7 @@ def _codes(root: TomlTable, key: str) -> frozenset[int]:
 
 
 def _folders(root: TomlTable, key: str) -> tuple[str, ...]:
-    """A list of folders that there are; a relative path counts from that of the setup file."""
+    """A list of existing folders; relative paths start from the folder of the setup file."""
     value = root.get(key)
     if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
         root.note(WRONG_VALUE, key, f"expected a list of folders, found {value!r}")
@@ -111,7 +111,7 @@ def _folders(root: TomlTable, key: str) -> tuple[str, ...]:
 
 
 def _switches(root: TomlTable, key: str) -> bool | frozenset[int] | None:
-    """How the switches of block delete stand: all on or off, those that are on, or "both" for all positions."""
+    """Position of the block delete switches: all on or off, the numbers of those on, or "both" for all positions."""
     value = root.get(key)
     if isinstance(value, bool):
         return value
@@ -124,7 +124,7 @@ def _switches(root: TomlTable, key: str) -> bool | frozenset[int] | None:
 
 
 def _count(root: TomlTable, key: str) -> int | None:
-    """A whole number above zero."""
+    """A positive integer."""
     value = root.integer(key)
     if value is not None and value < 1:
         root.note(WRONG_VALUE, key, f"expected a whole number above zero, found {value}")
@@ -191,4 +191,4 @@ READERS: dict[str, Callable[[TomlTable, str], Any]] = {
     "subprograms": _folders,
     "probed": _position,
 }
-"""The top-level keys, which are fields of `Setup`, and how each is read."""
+"""Readers of the top-level keys, which are fields of `Setup`."""

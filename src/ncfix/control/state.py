@@ -1,6 +1,4 @@
-"""The state of a control while it follows a program: what is in force, positions, what its numbers count from, and what
-is not known.
-"""
+"""The state of a control while it follows a program: modal codes, frames, positions, and what is unknown."""
 
 from __future__ import annotations
 
@@ -47,12 +45,13 @@ NO_MOTION = 800
 
 @mutable
 class Cycle:
-    """What of a canned cycle stays in force.
+    """Modal values of a canned cycle.
 
     depth    the word of the axis across the plane, as written
     r        the R word, as written
     level    R in the program's frame, mm
-    initial  where the series of holes began, across the plane, mm in the program's frame; None while none is in force
+    initial  coordinate across the plane at which the series of holes began, mm in the program's frame; None outside of
+             one
     unknown  one of these is known only at run time
     """
 
@@ -65,25 +64,25 @@ class Cycle:
 
 @mutable
 class Modal:
-    """What is in force. G codes in tenths.
+    """Modal state. G codes in tenths.
 
     motion        motion code
     straight      the last of G0 and G1
-    plane         of arcs and cycles
+    plane         plane of arcs and cycles
     unit          mm per unit of linear words
     diameter      X words are diameters (G7)
     incremental   G91
     arc_absolute  G90.1
     feed_mode     93, 94 or 95
-    feed          mm/min, 1/min or mm/rev; NaN where none is set, or one that is known only at run time
-    feed_given    a feed other than zero is set
+    feed          mm/min, 1/min or mm/rev; NaN if none is set, or if it is known only at run time
+    feed_given    a nonzero feed is set
     speed         S
     retract_to_r  G99: canned cycles end at R
-    compensated   41, 42 or 0: cutter radius compensation
+    compensated   cutter radius compensation: 41, 42 or 0
     system        1..9: G54..G59.3
-    tool_code     430 while a tool length offset is in force, 490 without
+    tool_code     430 with, 490 without a tool length offset in force
     spindle       3, 4 or 5
-    exact_stop    the control comes to a stop at the end of every motion
+    exact_stop    the control stops at the end of every motion
     """
 
     motion: int = NO_MOTION
@@ -108,7 +107,7 @@ class Modal:
 
 @frozen
 class Saved:
-    """A modal state that M70 or M73 has saved; `at_return`: it is restored when the subprogram returns."""
+    """A modal state saved by M70 or M73; `at_return`: restored when the subprogram returns."""
 
     modal: Modal
     at_return: bool
@@ -116,14 +115,14 @@ class Saved:
 
 @mutable
 class Tools:
-    """Tool numbers: prepared with T, in the spindle, and of the length offset in force.
+    """Tool numbers: selected with T, in the spindle, and of the length offset in force (`offset`).
 
     vector    the length offset in force, mm along each axis (rad)
-    register  the number by which contours get their radius (D), where that is not the tool's
-    cutter    the radius by which contours are offset, mm, where the program says it; NaN where it does not
-    lengths   lengths that the program has set (G10 L1), mm
-    measured  tools whose length it has set from what is known only at run time
-    unsure    which tool is in the spindle is known only at run time; `doubtful`: which one is selected
+    register  number of the radius compensation register (D), if it is not the tool's
+    cutter    radius for contour offsets, mm, if the program gives it; else NaN
+    lengths   tool lengths set by the program (G10 L1), mm
+    measured  tools whose length the program sets from values known only at run time
+    unsure    the tool in the spindle is known only at run time; `doubtful`: the selected one
     """
 
     selected: int = 0
@@ -138,11 +137,11 @@ class Tools:
     measured: set[int] = field(default_factory=set)
 
     def select(self, number: int, *, unsure: bool = False) -> None:
-        """The tool that is changed next; `unsure`: the number is only a nominal one."""
+        """Select the tool for the next change; `unsure`: the number is only nominal."""
         self.selected, self.doubtful = number, unsure
 
     def change(self) -> None:
-        """The tool that is selected comes into the spindle."""
+        """Put the selected tool into the spindle."""
         self.spindle, self.unsure = self.selected, self.doubtful
 
 
@@ -153,34 +152,34 @@ SPATIAL = 1 << X | 1 << Y | 1 << Z
 
 
 def named_switches(switches: Collection[int]) -> str:
-    """Switches of block delete as they are written in blocks: `/2 /3`."""
+    """Block delete switches as written in blocks: `/2 /3`."""
     return " ".join(f"/{number}" for number in sorted(switches))
 
 
 class ControlState(ABC):
-    """Where the axes stand, in commands and in the coordinates of the program.
+    """Positions of a control, in commands and in program coordinates, and everything they depend on.
 
-    axis_indices  letter indices of the axes of the machine, in the order of its columns
-    rotary     for each letter whether it turns; `turning`: the letter indices of the machine's rotary axes
-    posture    where the machine points its tool and its axes
-    modal      what is in force of modal codes; `tools` likewise
-    frames     the frames in force, in `frame_order`; `composed`: all of them as one
-    offset     what is added to the numbers of the program, turned and scaled: that of `composed`, and the tool length
+    axis_indices  letter indices of the machine's axes, in column order
+    rotary     for each letter, whether it is a rotary axis; `turning`: letter indices of the machine's rotary axes
+    posture    directions of the machine's tool and axes
+    modal      the modal codes in force; `tools`: the tools in use
+    frames     the frames in force, stacked in `frame_order`; `composed`: all of them as one
+    offset     what is added to program numbers after rotation and scaling: the shift of `composed` and the tool length
     stretch    mm per program unit of length in the frames in force
-    position   the command of every letter, mm and rad; a nominal value where `unknown` has the letter's index
-    unknown    letter index -> why the position is not known
-    frame_unknown  the same along the axes of a turned frame, where its words tell more than the axes of the machine do;
-                   None: these tell all
-    places     which axes the program itself has brought to where they stand
-    knowledge  what was asked of the setup, and what it does not give
-    offset_checked  it has been asked for the work offset in force
-    unit_said  the program has said whether it is in inches or millimetres, by `unit_codes`
-    tcp        X Y Z are those of the tip (tool-centre-point control)
-    tilted     a tilted plane is in force, in which they are
-    switches   the switches of block delete that have been asked, where that matters to the path
-    increments what a number without a decimal point counts, linear and rotary words
-    locate     where in the program we are; `messages` are the remarks so far, by their text, and `rolled` those about
-               axes that may roll over, which come behind them
+    position   the command of every letter, mm and rad; a nominal value for letters in `unknown`
+    unknown    letter index -> why the position is unknown
+    frame_unknown  the same along the axes of a rotated frame, if its words tell more than the machine axes; None: they
+                   do not
+    places     which axes the program itself has positioned
+    knowledge  access to the setup, with a record of missing data
+    offset_checked  whether the setup has been asked for the work offset in force
+    unit_said  whether the program has stated inch or millimetre, by `unit_codes`
+    tcp        whether X Y Z refer to the tip (tool-centre-point control)
+    tilted     whether a tilted plane is in force
+    switches   block delete switches on which the path depends
+    increments weight of a number without a decimal point, for linear and rotary words
+    locate     returns the current place in the program; `messages`: remarks so far, by text; `rolled`: remarks on axes
+               that may roll over, which follow them
     """
 
     frame_order: tuple[str, ...] = ("datum",)
@@ -223,16 +222,16 @@ class ControlState(ABC):
                 self.unknown[index] = AT_START
 
     def place(self) -> Place:
-        """Where in the program we are."""
+        """The current place in the program."""
         return self.locate()
 
     def warn(self, code: str, text: str, hint: str = "") -> None:
-        """A remark, once per text."""
+        """Record a warning; each text is recorded once."""
         if text not in self.messages:
             self.messages[text] = Message(code, text, self.place(), hint)
 
     def is_deleted(self, block: Deletable) -> bool:
-        """Whether a block that may be skipped is passed over."""
+        """Whether a block with block delete is skipped."""
         switches, stated = block.switches, self.setup.block_skip
         deleted = bool(switches & stated) if isinstance(stated, frozenset) else bool(stated)
         if not block.matters:
@@ -245,9 +244,10 @@ class ControlState(ABC):
         return deleted
 
     def set_unit(self, unit: float) -> None:
-        """Inch or mm comes into force, `unit` in mm.
+        """Set the unit of linear words: `unit` in mm.
 
-        What a feed from before is then is not known: a rotary axis keeps its degrees, and not every control the rest.
+        A feed set before is then unknown: a rotary axis keeps its degrees, and controls differ in what else they
+        convert.
         """
         modal = self.modal
         if unit != modal.unit and modal.feed_mode != FeedMode.INVERSE_TIME:
@@ -257,7 +257,7 @@ class ControlState(ABC):
 
     @property
     def feed_in_force(self) -> Value:
-        """The number of the F in force; zero without one."""
+        """The number of the F word in force; zero without one."""
         modal = self.modal
         if math.isnan(modal.feed):
             return Unknown("F") if modal.feed_given else 0.0
@@ -266,7 +266,7 @@ class ControlState(ABC):
     # -- frames -------------------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """Compose the frames; to be called after any of them, the tool, the unit or the diameter mode has changed."""
+        """Compose the frames; must be called after a change of a frame, the tool, the unit or the diameter mode."""
         whole = self.composed = self.frames.whole
         self.offset: Vector = [a + b for a, b in zip(whole.shift, self.tool_shift, strict=True)]
         if self.rotation != whole.rotation:
@@ -283,19 +283,19 @@ class ControlState(ABC):
 
     @property
     def tool_shift(self) -> Vector:
-        """What the tool length adds to the numbers of the program; under TCP they are those of the tip."""
+        """What the tool length adds to program numbers; nothing under TCP, where they refer to the tip."""
         return zeros() if self.tcp else self.tools.vector
 
     @abstractmethod
     def anchors(self) -> list[Hashable]:
-        """For each letter what its numbers count from, besides shifts and turns that the program states in numbers."""
+        """For each letter, the references of its numbers other than shifts and rotations stated in the program."""
 
     def spatial_anchor(self, index: int) -> Hashable:
-        """What else the numbers of X, Y and Z count from: whether they are those of the tip, and the tool's length."""
+        """Further references of X, Y and Z: whether they refer to the tip, and the tool of the length offset."""
         return self.tcp, self.tools.offset if (self.tcp and not self.tilted) or index == Z else None
 
     def program_position(self) -> Vector:
-        """Where the control stands in the frame of the program, mm and rad."""
+        """The current position in program coordinates, mm and rad."""
         inner = [p - o for p, o in zip(self.position, self.offset, strict=True)]
         return rotated(self.inverse, inner) if self.is_rotated else inner
 
@@ -304,14 +304,14 @@ class ControlState(ABC):
         return [dot(row, step) for row in self.inverse] if self.is_rotated else step[:3]
 
     def way_to(self, target: Vector) -> Vector:
-        """The way of X, Y and Z from where the control stands to a command, along those of its frame, mm."""
+        """Displacement of X, Y and Z from here to the command `target`, along the axes of the program's frame, mm."""
         return self.in_frame([b - a for a, b in zip(self.position, target, strict=True)])
 
     def circle(self, plane: Plane, centre: Point, sweep: float) -> Arc:
-        """An arc in command coordinates; NaN along axes of which it is not known where it starts.
+        """An arc in command coordinates; NaN along axes whose start position is unknown.
 
-        centre  from the start of the arc, in a plane of the program's frame, mm
-        sweep   rad, as the commands turn
+        centre  relative to the start of the arc, in a plane of the program's frame, mm
+        sweep   rad, in the sense in which the commands turn
         """
         away, normal = [0.0, 0.0, 0.0], IDENTITY[plane.across]
         away[plane.first], away[plane.second] = centre
@@ -323,7 +323,7 @@ class ControlState(ABC):
         return Arc((x, y, z), normal, sweep)
 
     def command(self, program: Vector, axes: int) -> Vector:
-        """The command of a position in the program's frame; axes that no word of `axes` moves stay where they are.
+        """The command for a position in program coordinates; axes not moved by the words `axes` keep their position.
 
         axes  bits of the axes of the frame that have a word
         """
@@ -334,13 +334,13 @@ class ControlState(ABC):
         return [value + offset if axes >> index & 1 else here for index, (value, offset, here) in places]
 
     def unit_of(self, index: int) -> float:
-        """mm or rad per program unit of an axis, X not as a diameter."""
+        """mm or rad per program unit of an axis; for X as a radius."""
         return DEGREE if self.rotary[index] else self.stretch
 
     # -- what is known ------------------------------------------------------------------------------------------------
 
     def use_start_positions(self, indices: Sequence[int]) -> None:
-        """The start positions of these axes matter: they are given, or lacking and taken as zero."""
+        """Resolve the start positions of these axes: those not given are recorded and count as zero."""
         for index in indices:
             if self.unknown.get(index) is AT_START:
                 self.knowledge.start_position(LETTERS[index])
@@ -349,27 +349,27 @@ class ControlState(ABC):
             self.frame_unknown = self.without_start(self.frame_unknown)
 
     def without_start(self, in_frame: UnknownAxes) -> UnknownAxes:
-        """What is not known along the axes of the frame, without start positions that have been asked for."""
+        """Unknown axes of the frame without start positions that have been resolved."""
         return {i: why for i, why in in_frame.items() if why is not AT_START or i in self.unknown}
 
     def stand(self, position: Vector, unknown: UnknownAxes, in_frame: UnknownAxes | None = None) -> None:
-        """The control stands there by itself: behind a hole, or where it comes back to.
+        """Set the position after a motion that the control makes by itself, as behind a hole or after a return.
 
-        in_frame  what is not known along the axes of the program's frame, where that says more than `unknown` does
+        in_frame  unknown axes of the program's frame, if that tells more than `unknown`
         """
         self.position, self.unknown, self.frame_unknown = position, unknown, in_frame
 
     def lose(self, indices: Sequence[int], reason: str) -> None:
-        """These axes stand somewhere that is not known from here on; `reason` has a `{}` for the axis letter."""
+        """Make the positions of these axes unknown; `reason` has a `{}` for the axis letter."""
         gone = {index: reason for index in indices if index in self.axis_indices}
         if self.frame_unknown is not None:
             self.frame_unknown = self.frame_unknown | self.along_frame(gone)
         self.unknown.update(gone)
 
     def lose_in_machine(self, indices: Sequence[int], reason: str) -> int:
-        """These axes of the machine stand somewhere that is not known: under TCP so does the tip, in X, Y and Z.
+        """Make the positions of these machine axes unknown; under TCP also those of the tip, X, Y and Z.
 
-        Returns all that are not known for that reason, as bits.
+        Returns all axes that are unknown for that reason, as bits.
         """
         gone = {index for index in indices if index in self.axis_indices}
         lost = sorted(gone | {*XYZ} if gone and self.tcp else gone)
@@ -377,39 +377,39 @@ class ControlState(ABC):
         return mask_of(lost)
 
     def lost_in_frame(self) -> UnknownAxes:
-        """What is not known along the axes of the program's frame."""
+        """Reasons for unknown coordinates along the axes of the program's frame."""
         if self.frame_unknown is not None and self.unknown:
             return self.frame_unknown
         return self.along_frame(self.unknown)
 
     def along_frame(self, unknown: UnknownAxes) -> UnknownAxes:
-        """Which axes of the program's frame are not known where these of the machine are not.
+        """Reasons for unknown coordinates in the program's frame, from those of machine axes.
 
-        In a turned frame one hides all that it has a part in.
+        In a rotated frame, an unknown machine axis makes every axis unknown that depends on it.
         """
         return mixed_into(unknown, self.inverse) if unknown and self.is_rotated else dict(unknown)
 
     @property
     def handedness(self) -> float:
-        """-1 where coordinates are mirrored, so that arcs turn the other way and left is right; else 1."""
+        """-1 in mirrored coordinates, where arcs turn the other way and left becomes right; else 1."""
         return handed(self.rotation)
 
     def axes_of(self, lost: UnknownAxes) -> UnknownAxes:
-        """Which axes of the machine are not known where this is not known along those of the program's frame."""
+        """Reasons for unknown machine axes, from those along the axes of the program's frame."""
         mixed = mixed_into(lost, self.rotation) if lost and self.is_rotated else lost
         return {index: why for index, why in mixed.items() if index in self.axis_indices}
 
     def stands_square(self) -> bool:
-        """Whether the tool is known to lie along Z of a tilted plane that is in force."""
+        """Whether the tool is known to lie along Z of the tilted plane in force."""
         return False
 
     def postures(
         self, direction: Sequence[float], rules: WayRules = NEAREST, here: Pair | None = None
     ) -> Postures | None:
-        """The ways to point the tool along a unit vector in the workpiece.
+        """The ways to point the tool along a unit vector in the workpiece, from angles `here` or the current ones, rad.
 
-        None where the kinematics are not known, or those of two rotary axes, or where these stand, unless there is one
-        way wherever that is. `here` says so where the control does not ask.
+        None if the kinematics are not known or are not those of two rotary axes. None also if the current angles are
+        unknown, unless there is only one way from anywhere.
         """
         if here is None and self.posture.pointing is not None:
             outer, inner = (self.axis_indices[column] for column in self.posture.pointing.columns)
@@ -432,31 +432,32 @@ class ControlState(ABC):
         return self.modal.plane.axes & mask_of(self.axis_indices)
 
     def tool_length(self) -> tuple[int, float]:
-        """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""
+        """Number and length (mm; NaN: unknown) of the tool of the length offset in force, else in the spindle."""
         if self.tools.offset is not None:
             return self.tools.offset, self.tools.vector[2]
         return self.tools.spindle, self.spindle_length()
 
     def spindle_length(self) -> float:
-        """The length of the tool in the spindle, mm, whether it is in force or not; NaN unknown."""
+        """The length of the tool in the spindle, mm, whether in force or not; NaN: unknown."""
         known = self.tools.lengths.get(self.tools.spindle, self.knowledge.known_tool_length(self.tools.spindle))
         return math.nan if known is None else known
 
     @property
     def length_under_tcp(self) -> float:
-        """The length of tool that X Y Z are of under TCP, mm."""
+        """The tool length to which X Y Z refer under TCP, mm."""
         return self.length_under_tcp_with(self.tools.vector, self.tools.offset)
 
     def length_under_tcp_with(self, tool: Vector, number: int | None) -> float:
-        """The length of tool that X Y Z are of with an offset in force, and the number of its tool (None without one).
+        """The tool length, mm, to which X Y Z refer with a given length offset and tool number (None: no offset).
 
-        Without one the control leads the spindle reference; if the setup says that X Y Z are those of the tip, the tip.
+        Without an offset X Y Z refer to the spindle reference; if the setup declares them as tip coordinates, to the
+        tip.
         """
         known = self.spindle_length() if number is None and self.setup.tcp else math.nan
         return tool[Z] if math.isnan(known) else known
 
     def tool_radius(self) -> float:
-        """The radius by which the control offsets contours, mm; NaN where it is not known."""
+        """The radius by which the control offsets contours, mm; NaN if unknown."""
         if not math.isnan(self.tools.cutter):
             return self.tools.cutter
         number = self.tool_length()[0] if self.tools.register is None else self.tools.register

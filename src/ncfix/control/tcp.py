@@ -1,12 +1,11 @@
-"""Tool-centre-point control (TCP): what is known of X Y Z when it goes on and off, or the tool length changes in it.
+"""Tool-centre-point control (TCP): X Y Z when it is switched on or off, or when the tool length changes under it.
 
-X Y Z of a command are then those of the tip in the workpiece. Only the machine's kinematics connect them with axis
-positions; where they are not given, only while all rotary axes stand at zero is known how the two differ: by the tool
-length along Z.
+Under TCP, X Y Z of a command are tip coordinates in the workpiece. Only the machine's kinematics relate them to axis
+positions. Without kinematics the difference is known only while all rotary axes are at zero: the tool length along Z.
 
-When TCP goes on or off the machine stands still, and X Y Z have other numbers; in machine coordinates some axes move
-and others do not. `renamed` and `passed_through` tell where the control believes its axes to stand then, also of
-axes that a correction has put beside their places.
+When TCP is switched, the machine stands still and X Y Z get other numbers; in a motion in machine coordinates some axes
+move and others do not. `renamed` and `passed_through` tell where the control then takes its axes to be, including axes
+that a correction has displaced.
 """
 
 from __future__ import annotations
@@ -28,23 +27,23 @@ if TYPE_CHECKING:
 MACHINE = TcpState(False, 0.0)
 
 ALIKE = 1e-7
-"""mm and rad; positions that are the same but for rounding."""
+"""Largest difference, mm and rad, of positions that are equal except for rounding."""
 
 TURNED = "where the axis {} stands in tool-centre-point coordinates depends on the machine's kinematics"
 
 
 def rotary_at_zero(control: ControlState, position: Vector, unknown: UnknownAxes) -> bool:
-    """Whether all rotary axes of the machine stand at zero."""
+    """Whether all rotary axes of the machine are at zero."""
     return all(index not in unknown and abs(position[index]) < 1e-12 for index in control.turning)
 
 
 def led_in_machine(control: ControlState, axes: Mapping[int, float], unsure: UnknownAxes) -> MotionEnd:
-    """Where a motion ends that leads axes to places of the machine, while the others stand still.
+    """The end of a motion that moves some axes to machine positions while the others stand still.
 
-    axes    letter index -> where that axis of the machine goes, mm or rad
-    unsure  why that is not known, of those of which it is not
+    axes    letter index -> machine position of that axis, mm or rad
+    unsure  reasons for those positions that are not known
 
-    Under TCP the tip moves along other axes, too: the numbers of an axis that stands still change with the rest.
+    Under TCP the tip also moves along other axes: the coordinate of an axis that stands still changes with the others.
     """
     target, unknown = control.position[:], dict(control.unknown)
     tip = TcpState(True, control.length_under_tcp)
@@ -70,7 +69,7 @@ def led_in_machine(control: ControlState, axes: Mapping[int, float], unsure: Unk
 
 
 def in_machine(control: ControlState) -> Vector | None:
-    """Where the axes of the machine stand under TCP; None if that is not known."""
+    """Machine positions of the axes under TCP; None if they are not known."""
     position = control.position[:]
     return (
         position
@@ -80,7 +79,7 @@ def in_machine(control: ControlState) -> Vector | None:
 
 
 def converted(control: ControlState, position: Vector, unknown: UnknownAxes, before: TcpState, after: TcpState) -> bool:
-    """Say the same position as another command, in place; False where that is not known."""
+    """Convert a position in place from one TCP state to another; returns False if that is not possible."""
     if rotary_at_zero(control, position, unknown):
         position[Z] += before.shift - after.shift
         return True
@@ -93,10 +92,10 @@ def converted(control: ControlState, position: Vector, unknown: UnknownAxes, bef
 
 
 def switch(control: ControlState, tool: Vector, on: bool, number: int | None) -> None:
-    """Another tool length, and tool-centre-point control on or off: the machine stands still, the tip may not.
+    """Change the tool length or switch TCP while the machine stands still; the coordinates may change.
 
-    Where the tool lies along Z of a tilted plane, another length moves the tip along that only. `number` is that of the
-    tool whose length it is, None if none is in force from here on.
+    If the tool lies along Z of a tilted plane, another length moves the tip along that Z only. `number` is that of the
+    tool whose length comes into force, None for none.
     """
     lost = {**control.lost_in_frame(), Z: TURNED} if on and control.tcp and control.stands_square() else None
     before = TcpState(control.tcp, control.length_under_tcp)
@@ -110,7 +109,7 @@ def switch(control: ControlState, tool: Vector, on: bool, number: int | None) ->
 
 
 def renamed(moves: Moves, row: int, position: Array, kinematics: Kinematics | None) -> Array | None:
-    """The command (n_axes,) at which a motion starts, if nothing but TCP or a tool length in it has changed before it.
+    """The command (n_axes,) at which a motion starts, if only TCP or its tool length changed before it; else None.
 
     position  (n_axes,) the command at the end of the motion before, as written
     """
@@ -127,11 +126,11 @@ def renamed(moves: Moves, row: int, position: Array, kinematics: Kinematics | No
 
 
 def passed_through(moves: Moves, row: int, position: Array, kinematics: Kinematics | None) -> Array | None:
-    """The command (n_axes,) at the end of a motion in machine coordinates that is left as it is, under TCP.
+    """The command (n_axes,) at the end of an uncorrected motion in machine coordinates under TCP.
 
-    Axes of the machine that it moves go where they do anyway, the others stand where `position` (n_axes,) has them: the
-    turn of a tilted plane, or the retreat in machine coordinates. None for other motions, also for those of which a
-    control says that in coordinates of the tip fewer axes move.
+    Machine axes that it moves go to their programmed positions, the others stay where `position` (n_axes,) has them:
+    the rotation into a tilted plane, or a retreat in machine coordinates. None for other motions, and for those in
+    which fewer axes move in tip coordinates than in machine coordinates.
     """
     state = _state(moves, row)
     if kinematics is None or not state.on or moves.rule[row] != Rule.PASS:
@@ -148,16 +147,16 @@ def passed_through(moves: Moves, row: int, position: Array, kinematics: Kinemati
 
 
 def _state(moves: Moves, row: int) -> TcpState:
-    """Whether tool-centre-point control is on in a motion, and with which length."""
+    """TCP state of a motion."""
     on = bool(moves.tcp[row])
     return TcpState(on, float(moves.length_under_tcp[row]) if on else 0.0)
 
 
 def jumps(moves: Moves) -> Mask:
-    """(n, n_axes) where a motion does not start where the one before ended.
+    """(n, n_axes) where a motion does not start at the end of the one before.
 
-    Where tool-centre-point control goes on or off, or has another length, linear axes stand elsewhere as soon as the
-    rotary axes are not quite at zero any more, though the program may have left them there.
+    When TCP is switched or its length changes, this includes the linear axes: as soon as the rotary axes are not
+    exactly at zero any more, their positions change, even if the program left them at zero.
     """
     found = np.zeros(moves.start.shape, dtype=bool)
     found[1:] = ~(moves.start[1:] == moves.end[:-1]) & ~(np.isnan(moves.start[1:]) & np.isnan(moves.end[:-1]))

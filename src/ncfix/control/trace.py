@@ -1,9 +1,9 @@
-"""Programs followed as the control would execute them, from their blocks to their motions: whole (`trace`) or in parts.
+"""Follows a program as the control would execute it, from blocks to motions: whole (`trace`) or in parts.
 
-A long program is read (`PartReader`) and followed (`Follower`) part after part, so that its length does not matter to
-the memory. A part ends between two blocks of plain words, where no cycle, call or loop can be under way. Its lines are
-those of the file, and templates, frames and reasons have the same numbers in all parts, so that parts can be joined.
-A `Checkpoint` is the state of the control between two parts.
+A long program is read (`PartReader`) and followed (`Follower`) part by part, so that memory does not grow with its
+length. A part ends between two blocks of plain words, where no cycle, call or loop can be active. Parts keep the line
+numbers of the file, and the numbers of templates, frames and reasons are the same in all parts, so that parts can be
+joined. A `Checkpoint` is the state of the control between two parts.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ from ncfix.text.tree import Program, Skip, Template
 from ncfix.values import frozen, mutable
 
 TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing", "angles", "calls"})
-"""The fields of `Moves` that are the same for all rows."""
+"""Fields of `Moves` that do not have one row per motion."""
 
 
 class NotInPartsError(Exception):
-    """The program cannot be taken part by part: it has to be read as a whole."""
+    """The program cannot be processed in parts and must be read as a whole."""
 
 
 @mutable
 class PartReader:
-    """Reads parts of one program.
+    """Reads a program part by part.
 
-    head        the first bytes of the text, by which it is told what it is; those of the first part, if not given
-    first_line  the line on which the next part begins
+    head        first bytes of the text, from which its kind is recognised; if not given, those of the first part
+    first_line  line number at which the next part begins
     line_end    the first line end of the first part
-    plain       shape -> whether a part may end before or after a block of it
+    plain       shape -> whether a part may end before or after a block of this shape
     """
 
     path: str
@@ -61,7 +61,7 @@ class PartReader:
         self.language = language_of(self.dialect, Language)
 
     def read(self, source: bytes) -> Program:
-        """The part that begins on `first_line`; raises what `reader.read` raises, `NotInPartsError` for o-words."""
+        """The part that begins on `first_line`. Raises as `reader.read`, and `NotInPartsError` for program flow."""
         begun = self.first_line > 1
         check_zeros(source, self.path, self.first_line)
         if not begun:
@@ -101,7 +101,7 @@ class PartReader:
 
 
 def stretch(program: Program, start: int, stop: int) -> Program:
-    """The blocks from `start` up to `stop` as a program of their own, its line end included."""
+    """The blocks from `start` up to `stop` as a program of its own, including its line end."""
     ends = (0 if start == 0 else int(program.blocks[start, 0]), len(program.source))
     if stop < len(program):
         ends = ends[0], int(program.blocks[stop, 0])
@@ -122,7 +122,7 @@ def stretch(program: Program, start: int, stop: int) -> Program:
 
 
 def joined(parts: list[Program]) -> Program:
-    """Parts that follow each other, as one."""
+    """Consecutive parts joined to one program."""
     if len(parts) == 1:
         return parts[0]
     bytes_before = np.cumsum([0, *(len(part.source) for part in parts)])
@@ -144,7 +144,7 @@ def joined(parts: list[Program]) -> Program:
 
 
 def joined_moves(parts: list[Moves], blocks: list[int]) -> Moves:
-    """The motions of parts that follow each other; `blocks`: how many blocks each of the parts has."""
+    """The motions of consecutive parts joined; `blocks`: number of blocks of each part."""
     if len(parts) == 1:
         return parts[0]
     before = np.cumsum([0, *blocks[:-1]])
@@ -173,11 +173,11 @@ LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
     "call": lambda moves: np.full(len(moves), -1, dtype=np.int32),
     "counted": lambda moves: np.repeat(moves.incremental[:, None], len(moves.axes), axis=1),
 }
-"""What columns of `Moves` mean that are left out."""
+"""Values of the optional columns of `Moves` that None stands for."""
 
 
 def _joined_columns(name: str, parts: list[Moves]) -> NDArray[Any] | None:
-    """One column of parts that follow each other; None if all lack it."""
+    """One column of consecutive parts; None if no part has it."""
     columns = [getattr(part, name) for part in parts]
     if all(column is None for column in columns):
         return None
@@ -186,7 +186,7 @@ def _joined_columns(name: str, parts: list[Moves]) -> NDArray[Any] | None:
 
 
 def last_of(program: Program, moves: Moves) -> tuple[Program, Moves]:
-    """The last motion and its block, as copies: the rest need not be kept for them."""
+    """The last motion and its block, as copies that keep no other data alive."""
     block = int(moves.block[-1])
     found = stretch(program, block, block + 1)
     columns = ("template", "blocks", "first_number", "number_spans", "numbers")
@@ -196,21 +196,21 @@ def last_of(program: Program, moves: Moves) -> tuple[Program, Moves]:
 
 
 def taken(moves: Moves, rows: Index) -> Moves:
-    """Motions `rows` (k,) alone."""
+    """The motions `rows` (k,)."""
     columns = ((each.name, getattr(moves, each.name)) for each in fields(Moves) if each.name not in TABLES)
     return replace(moves, **{name: column.take(rows, axis=0) for name, column in columns if column is not None})
 
 
 @frozen
 class Checkpoint:
-    """The state in which a part leaves a control, before its last block, where it has changed nothing else for good.
+    """The state of a control before the last block of a part that has changed nothing else permanently.
 
-    It goes from one process to another.
+    It can be sent to another process.
 
     position    (n_axes,) the command, mm and rad
-    feed        the feed in force; `feed_given`: there is one
+    feed        the feed in force; `feed_given`: whether one is set
     motion      the motion code in force, in tenths
-    variables   those that the program may have set, as the language has them
+    variables   variables that the program may have set, in the form of the language
     """
 
     position: list[float]
@@ -221,10 +221,10 @@ class Checkpoint:
 
 
 class Follower:
-    """Follows a program that comes in parts: the control keeps its state, the interpreter goes on where it was.
+    """Follows a program that comes in parts; control and interpreter keep their state between parts.
 
-    walk     makes the interpreter, given the first part
-    watched  it is to be found out what the next part leaves behind
+    walk     makes the interpreter for the first part
+    watched  whether to find out what the next part changes, as `checkpoint` requires
     """
 
     def __init__(
@@ -236,16 +236,16 @@ class Follower:
 
     @property
     def to_the_last(self) -> bool:
-        """What stands behind the end of the program matters: something was looked for that may be there."""
+        """Whether text after the end of the program matters, because something was searched that may be there."""
         return self.interpreter is not None and self.interpreter.to_the_last
 
     @property
     def ended(self) -> bool:
-        """The control has come to the end of the program."""
+        """Whether the control has reached the end of the program."""
         return self.interpreter is not None and self.interpreter.ended
 
     def follow(self, program: Program, last: bool) -> Moves:
-        """The motions of the next part; `last`: nothing comes after it."""
+        """The motions of the next part; `last`: it is the last one."""
         control, interpreter = self.control, self.interpreter
         begun = control.lasting() if self.watched and interpreter is not None else None
         if interpreter is None:
@@ -267,9 +267,9 @@ class Follower:
         return moves
 
     def checkpoint(self, moves: Moves) -> Checkpoint | None:
-        """What the part that was followed last, with these motions, has left; None if there is more to it than that.
+        """The state that the last part, with these motions, has left; None if a checkpoint cannot hold all of it.
 
-        Its last two blocks have to be straight motions.
+        The last two blocks of the part must be straight motions.
         """
         control, modal = self.control, self.control.modal
         if not self.unchanged or control.unknown or control.builder.winding is not None or len(moves) < 2:
@@ -285,7 +285,7 @@ class Follower:
         return Checkpoint(*before, control.set_variables())
 
     def resume(self, state: Checkpoint) -> None:
-        """Go on as if a part had been followed up to its last block, which comes next."""
+        """Continue as if a part had been followed up to its last block, which comes next."""
         modal = self.control.modal
         self.stand(np.array(state.position))
         modal.feed, modal.feed_given = state.feed, state.feed_given
@@ -294,34 +294,34 @@ class Follower:
         self.control.take_variables(state.variables)
 
     def stand(self, position: Array) -> None:
-        """Take the axes to a command (n_axes,), mm and rad, where the corrected program has left them."""
+        """Set the axis positions to a command (n_axes,), mm and rad, at which the corrected program has left them."""
         self.control.position = list(self.control.position)
         for column, value in zip(self.control.builder.columns, position.tolist(), strict=True):
             self.control.position[column] = value
 
     @property
     def lacking(self) -> tuple[Message, ...]:
-        """What the program used so far and the setup does not give, and axes that the machine lacks."""
+        """Errors for data that the program used and the setup does not give, and for axes that the machine lacks."""
         return self.control.lacking
 
     @property
     def messages(self) -> tuple[Message, ...]:
-        """What there is to say so far."""
+        """All remarks so far."""
         return self.control.remarks
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """What was taken as zero so far, in words."""
+        """Names of data taken as zero so far."""
         return tuple(self.control.knowledge.assumed)
 
 
 FAR = 1e9
-"""mm or rad; no machine goes farther from zero, and sums of such numbers do not tell micrometres apart."""
+"""Largest position, mm or rad: no machine goes beyond it, and doubles of that size no longer resolve micrometres."""
 TOO_FAR = "NCF248"
 
 
 def check_reach(program: Program, moves: Moves) -> None:
-    """Raise SourceError at the first motion that leads farther away than any machine goes."""
+    """Raise SourceError for the first motion that ends beyond the reach of any machine."""
     far, arcs = _are_far(moves.end), np.flatnonzero(moves.kind == MotionKind.ARC)
     far[arcs] |= _are_far(moves.centre[arcs])
     rows = np.flatnonzero(far & (moves.rule != Rule.REFUSE))
@@ -331,7 +331,7 @@ def check_reach(program: Program, moves: Moves) -> None:
 
 
 def _are_far(places: Array) -> Mask:
-    """(n,) which of (n, k) places are too far away."""
+    """(n,) whether each row of `places` (n, k) is out of reach."""
     rows = np.zeros(len(places), dtype=np.bool_)
     if not places.size or max(places.max(), -places.min()) <= FAR:
         return rows
@@ -340,7 +340,7 @@ def _are_far(places: Array) -> Mask:
 
 
 def finished(control: ProgramControl, program: Program, moves: Moves) -> Trace:
-    """The trace of a program; raises UsageError with all that was not given."""
+    """The trace of a program that has been followed; raises UsageError with all missing data."""
     check_reach(program, moves)
     control.note_rolling(program)
     if control.lacking:
@@ -366,14 +366,13 @@ def trace(
     resolve: Callable[[str], bytes | None] | None = None,
     kinematics: Kinematics | None = None,
 ) -> Trace:
-    """The motions of a program, in commands in mm and rad with all offsets in, in the order of execution.
+    """Follow a program: its motions in order of execution, as commands in mm and rad with all offsets included.
 
-    `axes` are the machine's axis letters, the columns of the motions; `rotary` those of them that turn. `resolve` gives
-    the text of a subprogram file by its name (`foo` for `o<foo> call`, `100` for `M98 P100`), None if there is none.
-    `kinematics` is the machine's; without it, where axes stand after tool-centre-point control goes on or off is known
-    only while the rotary axes stand at zero.
+    `axes` are the machine's axis letters, the columns of the motions; `rotary` those of rotary axes. `resolve` returns
+    the text of a subprogram file by its name (`foo` for `o<foo> call`, `100` for `M98 P100`), or None. `kinematics` are
+    the machine's; without them, positions after TCP is switched are known only while the rotary axes are at zero.
 
-    Raises SourceError NCF2xx at the first block at which the control would stop, UsageError with everything that the
+    Raises SourceError NCF2xx at the first block at which the control would stop, UsageError with all data that the
     program uses and the setup does not give, and with every axis that the program moves and the machine lacks.
     """
     strangers = [axis for axis in axes if axis not in AXIS_LETTERS]
@@ -387,6 +386,6 @@ def trace(
 
 
 def interpreter_of(program: Program, run: Run) -> Interpreter[Any]:
-    """The control's walk through a program, before its first step."""
+    """The interpreter of a program, before its first block."""
     language = language_of(program.dialect, FollowedLanguage)
     return language.interpreter(language.control(run, program.dialect), program, run)

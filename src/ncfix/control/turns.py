@@ -1,18 +1,17 @@
-"""Turns of rotary axes: the feed of blocks that turn them alone, and axes that may roll over.
+"""Rotary axes: the feed of blocks that turn only rotary axes, and axes that may roll over.
 
-The feed of a block that turns rotary axes alone is degrees per minute, until a correction moves a linear axis too.
-
+The feed of a block that moves only rotary axes is degrees per minute, until a correction also moves a linear axis.
 Many controls take F as the speed of the linear axes as soon as one of them moves, and let rotary axes keep pace. A
-correction of some micrometres at 500 mm/min is done in milliseconds, and so would be the turn. A corrected turn is
-therefore given its own time: where the control's rule is known, by the F that makes the little linear motion last as
-long; else in inverse time (G93), which means the same everywhere. What was in force is stated anew after it.
+correction of some micrometres at 500 mm/min takes milliseconds, and so would the rotation. A corrected rotation
+therefore gets its own time: if the control's rule is known, an F with which the small linear motion lasts as long;
+otherwise in inverse time (G93), which means the same everywhere. The feed in force is restated after it.
 
-Axes roll over where a parameter of the control lets an absolute word lead them the shorter way round. Nobody sees it in
-the program. Up to half a turn both ways are one; beyond it a control with roll-over turns the other
-way, and pieces of the longer way would lead the axis round against what the program did. So such a motion stays whole:
-its end is right either way. An axis that counts from 0 to 360 degrees and that increments have led out of them stands
-at another number than one that goes on counting: where words do not go the shorter way, a plain word behind that leads
-the two different ways, however short, and stays whole, too.
+An axis rolls over if a parameter of the control lets an absolute word turn it the shorter way. The program does not
+show it. Up to half a turn both ways are the same; beyond it, a control with roll-over turns the other way, and pieces
+of the longer way would turn the axis against the program's intention. So such a motion stays whole: its end is right
+either way. An axis that the control counts from 0 to 360 degrees has another position than one that counts on, once
+increments have moved it out of that range. If absolute words do not take the shorter way, the next one turns the two
+in different directions, and its motion stays whole, too.
 Source: Fanuc 30i parameter manual, No. 1008 (ROA, RAB); LinuxCNC takes words as they are, unless its axes are wrapped.
 Siemens, "SINUMERIK 840D sl, axes and spindles", R2: modulo axes, MD30455 (bit 2: G90 as AC or as DC).
 """
@@ -35,7 +34,7 @@ UNTIMED = (
 
 
 def turns_alone(moves: Moves) -> Mask:
-    """(n,) motions at feed in which rotary axes move and no linear axis does: those whose `turn_alone` is not 0."""
+    """(n,) feed motions in which rotary axes move and no linear axis does: those whose `turn_alone` is not 0."""
     alone: Mask = moves.kind == MotionKind.FEED
     for column in np.flatnonzero(~moves.rotary):
         alone &= moves.end[:, column] - moves.start[:, column] == 0
@@ -45,7 +44,7 @@ def turns_alone(moves: Moves) -> Mask:
 
 
 def turn_alone(moves: Moves, row: int) -> float:
-    """The angle of a motion at feed that turns rotary axes alone, in degrees; 0 for others."""
+    """The angle, degrees, of a feed motion that turns only rotary axes; 0 for other motions."""
     if moves.kind[row] != MotionKind.FEED:
         return 0.0
     way = moves.end[row] - moves.start[row]
@@ -55,13 +54,13 @@ def turn_alone(moves: Moves, row: int) -> float:
 
 
 def written_feed(moves: Moves, row: int) -> float:
-    """The number of the F in force in a motion; NaN if it is not known."""
+    """The number of the F word in force in a motion; NaN if unknown."""
     unit = 1.0 if moves.feed_mode[row] == FeedMode.INVERSE_TIME else moves.frames[moves.frame[row]].unit
     return float(moves.feed[row] / unit)
 
 
 def minutes(moves: Moves, row: int) -> float:
-    """The time of a motion at feed that turns rotary axes alone, in minutes; NaN for others, infinite if not known."""
+    """Duration of a feed motion that turns only rotary axes, min; infinite if unknown, NaN for other motions."""
     turn, mode = turn_alone(moves, row), moves.feed_mode[row]
     if not turn or mode == FeedMode.INVERSE_TIME:
         return float("nan")
@@ -72,9 +71,9 @@ def minutes(moves: Moves, row: int) -> float:
 ROLLS = "NCF247"
 HALF_A_TURN = math.pi * (1 - 1e-9)
 BESIDE = math.radians(0.5)
-"""rad; no correction turns an axis by as much."""
+"""Limit, rad, that no correction of a rotary axis reaches."""
 BESIDE_ZERO = 1e-9
-"""rad; nearer to zero an angle is zero."""
+"""Largest angle, rad, that counts as zero."""
 
 ROLLED = {
     "a rotary axis turns by half a turn or more here: a control with roll-over goes the other way, and such motions are"
@@ -84,22 +83,22 @@ ROLLED = {
         "say which way it is meant to go: ACP, ACN or DC"
     ),
 }
-"""What is said of axes that turn so far, and of those that come back from beyond a turn, with its hint."""
+"""Messages on axes that turn half a turn or more, and on axes that come back from beyond a full turn, with hints."""
 
 
 def may_roll(travel: Sequence[tuple[float, float]] | None, rotary: Mask) -> Mask | None:
-    """(n_axes,) axes that go a full turn or more, as far as is known, so that they might roll over; None: no axis."""
+    """(n_axes,) rotary axes that may roll over: their travel is unknown, or a full turn or more. None: no axis."""
     wide = [travel is None or high - low >= 2 * math.pi for low, high in travel or [(0.0, 0.0)] * len(rotary)]
     rolls: Mask = np.logical_and(wide, rotary)
     return rolls if rolls.any() else None
 
 
 def half_turns(directed: Mask, start: Array, end: Array) -> tuple[Mask, Mask] | None:
-    """Motions (n,) that turn an axis by half a turn or more, and those about half a turn long; None: there are none.
+    """Motions (n,) that turn an axis by half a turn or more, and those that turn it about half a turn; None: neither.
 
-    A correction of the angle might turn the latter round; those before them count as such, too.
+    A correction of an angle might reverse the latter; the motions before them are included.
 
-    directed    (n, k) axes whose words say which way they turn: increments, and those that name the sense
+    directed    (n, k) axes whose words determine the direction of rotation: increments, and words that name it
     start, end  (n, k) rad, of the axes that may roll over
     """
     way = np.abs(end - start)
@@ -112,19 +111,19 @@ def half_turns(directed: Mask, start: Array, end: Array) -> tuple[Mask, Mask] | 
 
 @mutable
 class Winding:
-    """Which axes stand where a word that was no plain angle has led them; motions may come in parts.
+    """Axes whose current angle was set by anything but a plain absolute word; kept from part to part.
 
-    wound  (n_axes,)
+    wound  (n_axes,) whether each axis is in that state
     """
 
     wound: Mask
 
     def back(self, turning: Index, plain: Mask, start: Array, end: Array) -> Mask:
-        """Motions (n,) whose plain words bring an axis back from beyond 0 and 360 degrees.
+        """Motions (n,) whose plain words bring an axis back from an angle below 0 or beyond 360 degrees.
 
         turning     (k,) the axes that may roll over
-        plain       (n, k) those with words that are absolute angles and do not say which way to go
-        start, end  (n, k) rad, in the numbers of the program
+        plain       (n, k) whether the axis has an absolute word that does not state the direction
+        start, end  (n, k) rad, in program coordinates
         """
         found = np.zeros(len(plain), dtype=bool)
         for column, axis in enumerate(turning.tolist()):
@@ -143,10 +142,10 @@ class Winding:
 
 
 def extremes(plain: Mask, end: Array) -> Array:
-    """The smallest and the largest angle (k, 2), rad, to which plain words lead axes; 0 is one of them.
+    """The smallest and the largest angle (k, 2), rad, of plain words for each axis; 0 is always included.
 
     plain  (n, k) axes with such words
-    end    (n, k) rad, in the numbers of the program
+    end    (n, k) rad, in program coordinates
     """
     named = end if plain.all() else np.where(plain, end, 0.0)
     if not np.isfinite(named).all():
