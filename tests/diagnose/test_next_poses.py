@@ -8,8 +8,8 @@ import pytest
 from measure.poses import machine, plan
 from ncfix.diagnosis.discrimination import COUNT, TOLD_APART, Discrimination, chance, climbed, exchanged, worst
 from ncfix.diagnosis.next_poses import (
-    SURE,
-    SURELY,
+    SURE_CHANCE,
+    SURE_SQUARES,
     Proposal,
     axes_beyond,
     marked,
@@ -115,13 +115,13 @@ def test_a_tool_that_was_not_used_is_marked_in_the_file() -> None:
 
 def test_the_chance_of_one_name_is_that_of_odds_that_scatter() -> None:
     random = np.random.default_rng(0)
-    for told in (TOLD_APART, 12.0, SURELY):
+    for told in (TOLD_APART, 12.0, SURE_SQUARES):
         # the log odds of two names whose predictions are told apart by t: half the difference of two sums of squares
         apart = np.sqrt(told / 36) * np.ones(36)
         noise = random.normal(size=(20_000, 36))
         odds = ((noise - apart) ** 2 - noise**2).sum(axis=1) / 2
         assert chance(told) == pytest.approx(float((odds > np.log(20)).mean()), abs=0.015)  # 4 s of 20 000 draws
-    assert chance(SURELY) == pytest.approx(SURE, abs=0.005)
+    assert chance(SURE_SQUARES) == pytest.approx(SURE_CHANCE, abs=0.005)
     assert Proposal("EYZ", None, 1.0, 11.0, 0.7, "", ()).times == 2
     assert Proposal("EYZ", None, 1.0, 25.0, 0.9, "", ()).times == 1
     assert Proposal("EYZ", None, 1.0, 25.0, 0.5, "", (), stuck=("EAZ",)).times is None

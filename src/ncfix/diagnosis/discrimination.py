@@ -1,6 +1,7 @@
-"""Poses chosen by exchange, so that whichever name is true, rivals that are refitted to them still err.
+"""Choice of poses that discriminate between names, by an exchange algorithm (T-optimal design).
 
-Each name in turn taken for the true one, and every other refitted to old and new rows together.
+Each name in turn is taken as true, and every rival is refitted to old and new rows together. Poses are good if the
+refitted rivals still deviate.
 """
 
 from __future__ import annotations
@@ -17,34 +18,37 @@ from ncfix.arrays import Array
 from ncfix.diagnosis.effect_form import EffectForm
 from ncfix.diagnosis.evidence import Evidence
 from ncfix.diagnosis.residual_data import ResidualData
-from ncfix.diagnosis.selection import ALIKE
+from ncfix.diagnosis.selection import ALIAS_LOG_ODDS
 from ncfix.measure.instruments import observe
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.observation import Observation
 from ncfix.values import frozen
 
 COUNT = 12
-"""Poses that are chosen."""
+"""Number of poses that are chosen."""
 PASSES = 4
+"""Largest number of passes of the exchange over all chosen poses."""
 STARTS = 60
 CLIMBED = 2
-"""Of so many random dozens, so many are improved."""
-LITTLE = 5e-3
-"""A pass that gains less is the last one."""
+"""Number of random starting sets, and of the best of them that are improved by exchange."""
+MIN_MERIT_GAIN = 5e-3
+"""A pass of the exchange that gains less is the last one."""
 LEAN = 0.01
-"""What an e-fold of what is told apart is worth where the chance is nearly one or nearly nothing anyway."""
+"""Worth of an e-fold more discrimination, which decides where the chance is nearly one or nearly zero anyway."""
 TOLD_APART = 6.0
-"""Squared noise units from which on a rival may be told apart: then the odds are 20 to 1 in one of two measurements."""
+"""Squared difference, in units of the noise, from which on a rival can be told apart: then one measurement in two gives
+odds of 20 to 1."""
 WEAK = 1e-6
-"""Prior on what is free, so that unseen combinations do no harm."""
+"""Prior precision of the free parameters, which keeps the matrix regular."""
 
 
 @frozen(repr=False, slots=False)
 class Discrimination:
-    """One name against another that imitates it: information of the old rows, and the blocks of every pose on offer.
+    """A true name against a refitted rival: normal equations of the old rows, and the rows of n poses on offer.
 
-    matrix, vector, square  inner products of what may be refitted, of that with the signal, of the signal
-    columns (n, r, k), signal (n, r)  of the poses on offer
+    matrix (k, k), vector (k,), square  inner products of the refitted columns, with the signal of the true name, and of
+                                        that signal, over the old rows, in units of the noise
+    columns (n, r, k), signal (n, r)    the same columns and signal at the poses on offer, r values each
     """
 
     matrix: Array
@@ -54,14 +58,14 @@ class Discrimination:
     signal: Array
 
     def told(self, rows: Sequence[int]) -> float:
-        """What of the signal the refitted rival cannot imitate with these poses too, squared noise units."""
+        """Squared signal, in units of the noise, that the rival refitted to old rows and these poses cannot imitate."""
         own = self.columns[list(rows)].reshape(-1, self.columns.shape[2])
         seen = self.signal[list(rows)].ravel()
         vector, square = self.vector + own.T @ seen, self.square + float(seen @ seen)
         return square - float(vector @ np.linalg.solve(self.matrix + own.T @ own, vector))
 
     def told_with(self, rows: Sequence[int]) -> Array:
-        """As `told`, with these poses and one more, for every pose on offer, (n,): a block of rows added to a fit."""
+        """`told` for these poses plus each pose on offer in turn, (n,), by a block update of the fit."""
         products, missed = self._seen
         count, height = self.signal.shape
         taken = (height * np.asarray(rows, dtype=np.int64)[:, None] + np.arange(height)).ravel()
@@ -77,13 +81,13 @@ class Discrimination:
 
     @cached_property
     def _alone(self) -> float:
-        """What the old rows tell."""
+        """`told` of the old rows alone."""
         return self.told([])
 
     @cached_property
     def _seen(self) -> tuple[Array, Array]:
-        """Covariance of the values of all poses on offer as the old rows leave it, (n r, n r), and what of the signal
-        the rival that is fitted to the old rows misses there, (n r,).
+        """For all poses on offer: covariance (n r, n r) of the rival's prediction from the old rows, and the signal
+        minus that prediction, (n r,).
         """
         factor = cholesky(self.matrix, lower=True)
         flat = self.columns.reshape(-1, self.columns.shape[2])
@@ -92,33 +96,33 @@ class Discrimination:
 
 
 Round = Sequence[Discrimination]
-"""A name that may be the true one, against each of the others."""
+"""One name taken as true, against each of the others."""
 
 
 def chance(told: Array | Sequence[float] | float) -> Array:
-    """How often a name that is right would be 20 to 1 likelier than one that is so well told apart from it.
+    """Probability that the true name becomes 20 to 1 likelier than a rival at a squared distance `told`.
 
-    Log odds of what is told apart by t squared noise units scatter about t / 2 with a variance of t.
+    At a squared distance t, in units of the noise, the log odds have mean t / 2 and variance t.
     """
     sure = np.maximum(np.asarray(told, dtype=np.float64), 1e-9)
-    found: Array = ndtr((sure / 2 - ALIKE) / np.sqrt(sure))
+    found: Array = ndtr((sure / 2 - ALIAS_LOG_ODDS) / np.sqrt(sure))
     return found
 
 
 def merit(told: Sequence[Array]) -> Array:
-    """What poses are worth, (n,), that tell each name's worst rival apart so well, (n,): the chance that one stays."""
+    """Merit (n,) of sets of poses; `told`: for each name taken as true the squared distance (n,) of its worst rival."""
     worth = [chance(each) + LEAN * np.log1p(np.maximum(each, 0.0)) for each in told]
     found: Array = np.mean(worth, axis=0)
     return found
 
 
 def worst(rounds: Sequence[Round], rows: Sequence[int]) -> list[float]:
-    """How well the worst rival of each name is told apart with these poses."""
+    """For each name taken as true, the squared distance of its worst rival with these poses."""
     return [min(each.told(rows) for each in own) for own in rounds]
 
 
 def exchanged(rounds: Sequence[Round], count: int) -> list[int]:
-    """Start with many random dozens, keep the best, and exchange one pose after another as long as that helps."""
+    """The best set of poses: many random starting sets, the best of them improved by exchange of single poses."""
     random = np.random.default_rng(0)
     starts = [random.permutation(count)[:COUNT].tolist() for _ in range(STARTS)]
     starts.sort(key=lambda rows: -_worth(rounds, rows))
@@ -131,7 +135,7 @@ def _worth(rounds: Sequence[Round], rows: Sequence[int]) -> float:
 
 
 def climbed(rounds: Sequence[Round], chosen: list[int]) -> list[int]:
-    """Every pose in turn replaced by the one on offer that helps most."""
+    """The set improved by replacing each pose in turn with the best one on offer."""
     value = _worth(rounds, chosen)
     for _ in range(PASSES):
         before = value
@@ -142,14 +146,14 @@ def climbed(rounds: Sequence[Round], chosen: list[int]) -> list[int]:
             best = int(told.argmax())
             if told[best] > value:
                 chosen, value = [*chosen[:place], best, *chosen[place + 1 :]], float(told[best])
-        if value < before + LITTLE:
+        if value < before + MIN_MERIT_GAIN:
             break
     return chosen
 
 
 @frozen(repr=False, slots=False)
 class Hypothesis:
-    """A name with what it would be: its likeliest form, the numbers behind it, and all forms with their sizes in um."""
+    """A name as fitted: its likeliest form, the independent numbers of that, and several forms with sizes, um."""
 
     group: EffectForm
     numbers: Array
@@ -158,11 +162,11 @@ class Hypothesis:
 
 @frozen(repr=False, slots=False)
 class HypothesisPairs:
-    """All contests between some names, over poses on offer.
+    """All pairs of a true name and a rival, over the poses on offer.
 
-    names     the first is the one that was chosen
-    contests  for each name, were it true, one against each of the others in their order
-    count     poses on offer
+    names     the first is the selected one
+    contests  for each name taken as true: one discrimination from each of the others, in their order
+    count     number of poses on offer
     """
 
     names: tuple[str, ...]
@@ -171,7 +175,7 @@ class HypothesisPairs:
 
     @staticmethod
     def of(evidence: Evidence, sides: Sequence[Hypothesis], offered: Measurement, sigma: float) -> HypothesisPairs:
-        """The pairs between the sides; `sigma` is the noise of a value, um."""
+        """All pairs between the hypotheses `sides`; `sigma` is the noise of a value, um."""
         new = seen_at(evidence.background.data, offered)
         pairs = [[(true, other) for other in sides if other is not true] for true in sides]
         contests = [[_contest(evidence, new, *pair, sigma) for pair in own] for own in pairs]
@@ -179,35 +183,35 @@ class HypothesisPairs:
 
     @cached_property
     def able(self) -> list[list[bool]]:
-        """Whether all poses together would tell the other from the true one, for each contest."""
+        """For each contest, whether all poses on offer together would tell the rival from the true name."""
         return [[each.told(range(self.count)) > TOLD_APART for each in own] for own in self.contests]
 
     @cached_property
     def useful(self) -> list[list[Discrimination]]:
-        """The contests that poses can decide, of the names that have any."""
+        """The contests that the poses on offer can decide; names without any are left out."""
         kept = [list(compress(own, can)) for own, can in zip(self.contests, self.able, strict=True)]
         return [own for own in kept if own]
 
     @property
     def told_from_first(self) -> tuple[str, ...]:
-        """The other names that can be told from the first one, or it from them."""
+        """The other names that can be told from the first one, or the first one from them."""
         ways = zip(self.names[1:], self.able[0], self.able[1:], strict=True)
         return tuple(name for name, there, back in ways if there or back[0])
 
     @property
     def stuck(self) -> tuple[str, ...]:
-        """The names that some other would imitate at all poses, were they true."""
+        """The names that, if true, some other name would imitate at all poses on offer."""
         return tuple(name for name, can in zip(self.names, self.able, strict=True) if not all(can))
 
 
 def seen_at(data: ResidualData, plan: Measurement) -> Observation:
-    """What is seen at the poses of a plan: the components that files of its kind have, without values."""
+    """The observation at the poses of a plan, without values: with the components that files of its kind have."""
     seen = {name for each in data.measurements if each.kind == plan.kind for name in each.measured}
     return observe(plan.with_columns({name: np.zeros(len(plan)) for name in sorted(seen)}), data.machine)
 
 
 def _contest(evidence: Evidence, new: Observation, true: Hypothesis, other: Hypothesis, sigma: float) -> Discrimination:
-    """Columns: set-up of the old rows, of the new ones, constants of the machine, the forms of the other."""
+    """The discrimination of `true` from `other`, which is refitted with both set-ups and the constants."""
     data = evidence.background.data
     constants = data.problem.design.shape[1]
     used = data.base.shape[1] - constants
@@ -233,6 +237,6 @@ def _contest(evidence: Evidence, new: Observation, true: Hypothesis, other: Hypo
 
 
 def _shown(new: Observation, group: EffectForm) -> Array:
-    """What the numbers of a form show in the poses on offer, um."""
+    """Effect of the numbers of a form at the poses on offer, um."""
     used = group.loading.any(axis=1)
     return new.um[:, None] * new.design(group.owner.effects)[:, used] @ group.loading[used]

@@ -1,7 +1,7 @@
 """A form of an effect as columns of the data, and its log odds in closed form.
 
-A form whose columns Z have independent numbers of variance s^2 has log odds -1/2 ln|1 + s^2 B| - n/2 ln(1 - gain) with
-B = Z'V^-1 Z, in values of covariance V whose scale is integrated out (MacKay 1992).
+For columns Z with independent coefficients of variance s^2, in data of covariance V with unknown scale, the log odds
+are -1/2 ln|1 + s^2 B| - n/2 ln(1 - gain), with B = Z'V^-1 Z (MacKay 1992).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ncfix.values import frozen
 
 Real = TypeVar("Real", np.float32, np.float64)
 Blocks = list[tuple[Ints, Ints, Array]]
-"""For each width: numbers of the groups, their columns (g, w), their inner products (g, w, w)."""
+"""For each width w, the g groups of w columns: indices of groups, of columns (g, w), inner products (g, w, w)."""
 
 
 @frozen(repr=False, slots=False)
@@ -27,9 +27,8 @@ class EffectForm:
     """One form of a candidate.
 
     owner     the candidate
-    loading   (k, p) from p independent numbers to its coefficients, per um
-    single    (m, p) what those show, um; of thousands of them single precision is half of all memory, and rounds
-              far below what any instrument reads
+    loading   (k, p) from p independent numbers to its k coefficients, per um
+    single    (m, p) effect of those numbers on the values, um; in single precision, since there are thousands
     """
 
     owner: Candidate
@@ -38,32 +37,32 @@ class EffectForm:
 
     @classmethod
     def of(cls, owner: Candidate, loading: Array, columns: Array) -> EffectForm:
-        """With these columns."""
+        """The form with columns (m, p) of double precision."""
         return cls(owner, loading, columns.astype(np.float32))
 
     @property
     def columns(self) -> Array:
-        """(m, p) what the independent numbers show, um."""
+        """(m, p) effect of the independent numbers on the values, um."""
         return self.single.astype(np.float64)
 
     @property
     def width(self) -> int:
-        """How many independent numbers there are."""
+        """Number of independent numbers, p."""
         return int(self.single.shape[1])
 
 
 def side_by_side(parts: Iterable[NDArray[Real]]) -> NDArray[Real]:
-    """Columns (m, ...) of several beside one another, each column in one piece of memory."""
+    """Concatenate the columns (m, ...) of several parts; each column is contiguous in memory."""
     return np.concatenate([part.T for part in parts]).T
 
 
 def column_bounds(groups: Sequence[EffectForm]) -> list[int]:
-    """Where the columns of each begin and end, once they stand side by side."""
+    """Bounds of the columns of each group after `side_by_side`."""
     return [0, *accumulate(group.width for group in groups)]
 
 
 def blocks_of(products: Sequence[Array]) -> Blocks:
-    """The inner products (w, w) of each group's columns with themselves, those of one width together."""
+    """Inner products (w, w) of each group's columns with themselves, stacked by width w."""
     bounds = [0, *accumulate(len(each) for each in products)]
     widths: dict[int, list[int]] = {}
     for group, own in enumerate(products):
@@ -81,10 +80,11 @@ def blocks_of(products: Sequence[Array]) -> Blocks:
 def block_odds(
     blocks: Blocks, projected: Array, taken: Array, total: float, count: float, sizes: Sequence[float]
 ) -> Array:
-    """Log odds of every group in every size, (groups, sizes).
+    """Log odds of every group at every size, (groups, sizes).
 
-    projected  (p,) inner products of all columns with the data; taken (k, p): of the inner products of columns taken'
-               taken is gone to what is there besides; total, count: as in `log_odds`
+    projected  (p,) inner products of all columns with the data
+    taken      (k, p): taken' taken is subtracted from the inner products of columns, for the members already there
+    total, count  as in `log_odds`
     """
     odds = np.empty((sum(len(groups) for groups, _, _ in blocks), len(sizes)))
     for groups, places, inner in blocks:
@@ -94,10 +94,12 @@ def block_odds(
 
 
 def log_odds(inner: Array, projected: Array, total: float, count: float, sizes: Sequence[float]) -> Array:
-    """Log odds per size, (..., p, p) inner products of columns and (..., p) with the data -> (..., sizes).
+    """Log odds per size, (..., sizes).
 
-    `total` is the sum of squares of the data, `count` its freedom. One Cholesky factor of [[I/s^2 + B, a], [a', total]]
-    has the determinant in its diagonal and what the columns gain in its last row.
+    inner  (..., p, p) inner products B of columns; projected (..., p): a, of columns with the data
+    total  sum of squares of the data; count: its degrees of freedom
+    One Cholesky factor of [[I/s^2 + B, a], [a', total]] holds the determinant in its diagonal and the gain of the
+    columns in its last row.
     """
     width, each = inner.shape[-1], np.asarray(sizes)
     bordered = np.zeros((*inner.shape[:-2], len(each), width + 1, width + 1))  # the lower half is all that counts

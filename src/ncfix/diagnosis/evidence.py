@@ -1,32 +1,27 @@
-"""The noise in which an effect must show: of the instrument, and a little of everything that machines do.
+"""The evidence of the data for a set of effects, beside noise and a background of small effects.
 
-A real machine has many small effects at once, and an instrument wanders. So the residual is taken as base columns, plus
-noise, plus noise that lasts for some minutes, plus a little of every candidate together. In the coordinates `rotation`
-(orthogonal to the base, error contrasts of restricted likelihood; then principal axes of "everything") the covariance
-is diagonal for every share of that background: sigma^2 (1 + share^2 `spectrum`).
+Background. A real machine has many small effects at once, and an instrument drifts. So the residual is modelled as base
+columns, plus white noise, plus noise correlated over minutes, plus a small amount of every candidate ("everything"). In
+the coordinates `rotation` (error contrasts of restricted likelihood, orthogonal to the base; then principal axes of
+"everything") the covariance is diagonal for every share of that background: sigma^2 (1 + share^2 `spectrum`).
 
-Evidence in closed form: how much likelier the data are if an effect is there.
+Members. A form of an effect is a group of columns Z whose coefficients are independent with variance s^2. A member adds
+s^2 Z Z' to the covariance. The scale of the noise is integrated out. A further group beside the members has log odds in
+closed form (effect_form.py).
 
-In the coordinates of the background its covariance is diagonal for every share of "a little of everything". A form of
-an effect is a group of columns Z with independent numbers of variance s^2, a member; members that are there add
-Z Z' s^2 to the covariance, and the scale of the noise is integrated out. A group that is offered beside the members has
-log odds in closed form (effect_form.py).
-
-One account of evidence: how well a set of effects explains the data, less what each of them must pay.
-
-The weight of a set is the log likelihood of the data with these effects there (evidence.py), less a price for each:
+Weight. The weight of a set is the log likelihood of the data with these members, less a price for each:
 
     ln(names)         it was chosen from all names of the catalogue
     ln(forms sizes)   and its form and size from those that it may have
     SURE, FURTHER     ln 100 for the first, ln 20 for every further one
-    UNNAMED           ln 20 more for a rival without a name: of twenty effects that are missing one is in no catalogue
+    UNNAMED           ln 20 more for an unnamed alternative: one missing effect of twenty is in no catalogue
 
 The first two make the weights of all sets probabilities of one mixture, whose mean under noise alone is 1. So by
-Markov's inequality noise weighs more than an empty set in at most one of a hundred measurements, and more with a name
-too many than with the true set in at most one of twenty, of whatever design (e-values: Vovk and Wang 2021).
+Markov's inequality, whatever the design, noise outweighs the empty set in at most one of a hundred measurements, and a
+superfluous name outweighs the true set in at most one of twenty (e-values: Vovk and Wang 2021).
 
-An effect is never quite what the catalogue says: the true one may differ in shape by a smooth share (`MISSHAPEN`) of
-what it shows. What such a change explains is no reason for another name, nor for a rival.
+Shape. The true effect may differ from the catalogue by a smooth change of shape, a share `MISSHAPEN` of its size. What
+such a change explains is no reason for another name, nor for an unnamed alternative.
 """
 
 from __future__ import annotations
@@ -49,42 +44,44 @@ from ncfix.measure.least_squares import inverse
 from ncfix.values import frozen, mutable
 
 SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
-"""Size of everything else together, against the noise of one value."""
+"""Sizes of the background of small effects that are considered, in units of the noise of one value."""
 PRIOR = (0.3, 0.3, 0.25, 0.12, 0.03)
-"""How likely these are beforehand."""
-TOGETHER = 64
-"""Groups that are carried into the coordinates at once: of many the copies would take much memory."""
+"""Prior probabilities of `SHARES`."""
+BATCH = 64
+"""Groups that are transformed at once, to limit memory."""
 FALLEN = 12.0
-"""A share of the background that is less likely than another by this log likelihood adds nothing."""
+"""A share of the background less likely than the best by this log likelihood is neglected."""
 Members = Mapping[str, "Member"]
 
 FALSE_ALARM = 0.01
-"""How often noise alone may name anything."""
+"""Largest probability that noise alone leads to any name."""
 COMPANION = 0.05
-"""How often noise alone may bring a further name."""
+"""Largest probability that noise alone leads to a further name."""
 SURE, FURTHER = float(-np.log(FALSE_ALARM)), float(-np.log(COMPANION))
+"""Prices, log odds, of the first effect of a set and of each further one."""
 UNNAMED = float(np.log(20.0))
-"""Log odds beforehand against what is in no catalogue."""
+"""Price, log odds, of an effect that is in no catalogue."""
 MISSHAPEN = 0.2
-"""How much the shape of an effect may differ from that of the catalogue, as a share of what it shows."""
+"""Standard deviation of a change of an effect's shape against the catalogue, as a share of its size."""
 DRIFT_TIME = 900.0
-"""s: how long an instrument's wandering lasts."""
+"""Correlation time of the drift of an instrument, s."""
 USUAL_SHARE = SHARES[2]
-"""The share of the background at which it is asked what the members show."""
+"""Share of the background at which the sizes of the members are estimated."""
 
 
 @frozen(repr=False, slots=False)
 class Background:
-    """The coordinates and the likelihoods in them.
+    """Noise and background of small effects, and the coordinates in which their covariance is diagonal.
 
-    data      what was measured
-    relative  (m,) standard deviation of each value against that of a plain one, outliers very large
+    data      the measured values
+    relative  (m,) standard deviation of each value relative to a usual one; very large for outliers
     rotation  (m, n) to the n coordinates; its columns are in units of the noise
-    spectrum  (n,) variance of everything at a size of one noise, along the coordinates
-    sigma     um, standard deviation of one plain value before anything was looked at
-    freedom   degrees of freedom of that; the data have n of their own
-    drift     size of the instrument's wandering against the noise
-    everything  (m, m) covariance of a little of everything at 1 um, um^2
+    spectrum  (n,) variance of "everything" along the coordinates, at a size of one noise
+    sigma     prior standard deviation of a usual value, um
+    freedom   degrees of freedom of `sigma`; the data have n of their own
+    drift     standard deviation of the instrument's drift, in units of the noise
+    everything  (m, m) covariance of "everything" at a size of 1 um, um^2
+    precisions  cache: share -> `precision`
     """
 
     data: ResidualData
@@ -98,7 +95,7 @@ class Background:
     precisions: dict[float, Array] = field(default_factory=dict)
 
     def precision(self, share: float) -> Array:
-        """The inverse of the covariance of all values with this share of everything, um^-2, (m, m); computed once."""
+        """Inverse covariance of all values with this share of the background, um^-2, (m, m); cached."""
         if share not in self.precisions:
             covariance = with_noise(self.everything, share, self.relative)
             wandering = wandering_correlation(self.data, self.relative) if self.drift else None
@@ -113,7 +110,7 @@ class Background:
         return self.precisions[share]
 
     def seen(self, columns: Array) -> Array:
-        """Columns (m, p) or values (m,) um in the coordinates, in units of `sigma`."""
+        """Columns (m, p) or values (m,), um, transformed to the coordinates, in units of `sigma`."""
         scaled: Array = columns.T @ self.rotation
         scaled /= self.sigma
         return scaled.T
@@ -131,16 +128,16 @@ def in_noise(covariance: Array, relative: Array) -> Array:
 
 
 def with_noise(everything: Array, share: float, relative: Array) -> Array:
-    """The covariance (m, m) of noise and a share of everything, in units of each value's noise; `relative` (m,)."""
+    """Covariance (m, m) of noise plus a share of "everything", in units of each value's noise; `relative` (m,)."""
     found = in_noise(everything, relative / share)
     found[np.diag_indices_from(found)] += 1.0
     return found
 
 
 def wandering_correlation(data: ResidualData, relative: Array) -> Array | None:
-    """What the times between values of one component say of their wandering together, in units of each value's noise.
+    """Covariance (m, m) of the instrument's drift at the size of the noise, in units of each value's noise.
 
-    (m, m), by `relative` (m,); None without a clock.
+    It falls exponentially with the time between two values of one file and component. None if no time was logged.
     """
     time = data.column("time_s")
     if np.ptp(time) == 0:
@@ -156,13 +153,16 @@ def wandering_correlation(data: ResidualData, relative: Array) -> Array | None:
 
 
 def marginal(squares: float, log_determinant: float, count: int, freedom: float) -> float:
-    """Log likelihood of `count` values, sum of squares in units of a variance known with `freedom`."""
+    """Log likelihood of `count` whitened values with the scale of the noise integrated out.
+
+    squares  their sum of squares, in units of a variance that is known with `freedom` degrees of freedom
+    """
     return -0.5 * log_determinant - 0.5 * (count + freedom) * float(np.log((squares + freedom) / (count + freedom)))
 
 
 @frozen(slots=False)
 class Member:
-    """An effect that is taken to be there: a form and its size."""
+    """An effect assumed to be there: the index of its form, and its size, um."""
 
     group: int
     size: float
@@ -170,10 +170,11 @@ class Member:
 
 @frozen(repr=False, slots=False)
 class DataProducts:
-    """Inner products of the data with the covariance of the background at one share.
+    """Inner products, weighted by the inverse covariance V of the background at one share.
 
-    projected    (p,) with all columns; squares with themselves
-    determinant  log determinant of the covariance
+    projected    (p,) of the data with all columns
+    squares      of the data with themselves
+    determinant  log determinant of V
     """
 
     projected: Array
@@ -183,18 +184,18 @@ class DataProducts:
 
 @frozen(slots=False)
 class CandidateOdds:
-    """Log odds of every group per size (um) beside some members, (groups, sizes)."""
+    """Log odds of every group at every size (um), given some members: (groups, sizes)."""
 
     odds: Array
     sizes: Sequence[float]
 
     def of(self, groups: Sequence[int]) -> float:
-        """Log odds of an effect with these forms, whichever form and size it has."""
+        """Log odds of an effect with these forms, averaged over forms and sizes."""
         own = self.odds[list(groups)]
         return float(own.max() + np.log(np.exp(own - own.max()).mean()))
 
     def likeliest(self, groups: Sequence[int], count: int = 1) -> list[Member]:
-        """Its likeliest forms, each with its likeliest size."""
+        """The likeliest `count` forms among `groups`, each with its likeliest size."""
         own = self.odds[list(groups)]
         order = np.argsort(-own.max(axis=1))[:count]
         return [Member(groups[int(form)], self.sizes[int(own[form].argmax())]) for form in order]
@@ -202,10 +203,10 @@ class CandidateOdds:
 
 @mutable(repr=False, slots=False)
 class Evidence:
-    """All groups in the coordinates of the background, and the names that own them.
+    """All forms of all effects in the coordinates of the background, and their inner products, cached.
 
-    groups  those with a name come first, `named` of them; then their rivals without one
-    most    how many of `SHARES`, from the least, the background may have
+    groups  the forms: first `named` forms of named effects, then those of unnamed alternatives
+    most    number of `SHARES`, from the smallest, that the background may have
     """
 
     background: Background
@@ -224,12 +225,12 @@ class Evidence:
     products: dict[tuple[float, int], Array] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Carry everything into the coordinates, once."""
+        """Transform all columns and the data to the coordinates."""
         self.bounds = np.concatenate([[0], np.cumsum([group.width for group in self.groups])])
         rotation = (self.background.rotation / self.background.sigma).astype(np.float32)
         seen = np.empty((int(self.bounds[-1]), rotation.shape[1]), dtype=np.float32)
-        for start in range(0, len(self.groups), TOGETHER):
-            some = self.groups[start : start + TOGETHER]
+        for start in range(0, len(self.groups), BATCH):
+            some = self.groups[start : start + BATCH]
             part = slice(int(self.bounds[start]), int(self.bounds[start + len(some)]))
             np.matmul(np.concatenate([group.single.T for group in some]), rotation, out=seen[part])
         self.columns = seen.T
@@ -241,29 +242,29 @@ class Evidence:
         self.alternatives = tuple(name for name, own in self.forms.items() if own[0] >= self.named)
 
     def constant(self, name: str) -> bool:
-        """Whether a name is of a constant that the machine file lacks."""
+        """Whether a name is a constant that the machine file lacks."""
         return self.groups[self.forms[name][0]].owner.constant
 
     def part(self, index: int) -> slice:
-        """Where a group's columns are."""
+        """The columns of a group."""
         return slice(int(self.bounds[index]), int(self.bounds[index + 1]))
 
     def own(self, index: int) -> Array:
-        """A group's columns, (n, w)."""
+        """A group's columns in the coordinates, (n, w)."""
         return self.columns[:, self.part(index)].astype(np.float64)
 
     def across(self, others: Array) -> Array:
-        """The inner products of some columns (n, k) with those of all groups, (k, p)."""
+        """Inner products of columns (n, k) with the columns of all groups, (k, p)."""
         found = np.empty((others.shape[1], self.columns.shape[1]))
-        for start in range(0, len(self.groups), TOGETHER):
-            part = slice(self.bounds[start], self.bounds[min(start + TOGETHER, len(self.groups))])
+        for start in range(0, len(self.groups), BATCH):
+            part = slice(self.bounds[start], self.bounds[min(start + BATCH, len(self.groups))])
             np.matmul(others.T, self.columns[:, part].astype(np.float64), out=found[:, part])
         return found
 
     def candidate_odds(self, members: Sequence[Member], beside: Array | None = None) -> CandidateOdds:
-        """The odds of all groups beside these members, at their likeliest share of the background.
+        """The odds of all groups given these members, at the likeliest share of the background.
 
-        beside  further columns in the coordinates that are there at unit size
+        beside  further columns, in the coordinates, with coefficients of unit variance
         """
         share = self.share(members, beside)
         inner, freedom = self._inner(share), self.background.freedom
@@ -279,28 +280,28 @@ class Evidence:
         return CandidateOdds(block_odds(self._blocks(share), projected, taken, total, count, sizes), sizes)
 
     def likelihood(self, members: Sequence[Member], beside: Array | None = None) -> float:
-        """Log likelihood of the data with these members there and no others, whatever the share of the background."""
+        """Log likelihood of the data with exactly these members, averaged over the share of the background."""
         return float(logsumexp(self._likelihoods(members, beside)))
 
     def share(self, members: Sequence[Member], beside: Array | None = None) -> float:
-        """The likeliest share of everything in the background beside these members."""
+        """The likeliest share of the background, given these members."""
         return SHARES[int(self._likelihoods(members, beside).argmax())]
 
     def by_share(self, members: Sequence[Member], beside: Array | None = None) -> list[tuple[float, float]]:
-        """Log likelihood of the data with each share of everything, its prior counted in; and the share."""
+        """For each share that is not negligible: (log likelihood plus log prior of the share, share)."""
         found = self._likelihoods(members, beside)
         return [(float(own), share) for own, share in zip(found, SHARES, strict=True) if np.isfinite(own)]
 
     def noise(self, members: Sequence[Member], share: float) -> float:
-        """The variance of the noise with these members against what was taken for it before the data were seen."""
+        """Estimated variance of the noise, given these members, relative to the prior one (`Background.sigma`^2)."""
         _, own = self._solved(members, None, share)
         squares, freedom = self._inner(share).squares - float(own @ own), self.background.freedom
         return (squares + freedom) / (len(self.y) + freedom)
 
     def _likelihoods(self, members: Sequence[Member], beside: Array | None) -> Array:
-        """For every share, its probability beforehand counted in, (shares,); -inf for those far from the likeliest.
+        """Log likelihood plus log prior of every share, (shares,); -inf for shares far from the likeliest.
 
-        It has one peak: from the middle share on, each side is followed until it has fallen by `FALLEN`.
+        It has one peak: from the middle share, each side is followed until it has fallen by `FALLEN`.
         """
         found, middle = np.full(len(SHARES), -np.inf), min(len(SHARES) // 2, self.most - 1)
         for side in (range(middle, -1, -1), range(middle + 1, self.most)):
@@ -317,13 +318,13 @@ class Evidence:
         return marginal(inner.squares - float(own @ own), determinant, len(self.y), self.background.freedom)
 
     def _solved(self, members: Sequence[Member], beside: Array | None, share: float) -> tuple[Array, Array]:
-        """The Cholesky factor of 1 + K'V^-1 K for the columns K of what is there, and what it makes of K'V^-1 y."""
+        """The Cholesky factor L of 1 + K'V^-1 K, for the columns K of members and `beside`; and L^-1 K'V^-1 y."""
         inner, seen = self._gram(members, beside, share)
         factor = cholesky(inner, lower=True, overwrite_a=True, check_finite=False)
         return factor, solve_triangular(factor, seen, lower=True, check_finite=False)
 
     def _gram(self, members: Sequence[Member], beside: Array | None, share: float) -> tuple[Array, Array]:
-        """Identity and inner products of what is there, (k, k), the lower half, and those with the data, (k,)."""
+        """1 + K'V^-1 K, (k, k), its lower half only, and K'V^-1 y, (k,), for the columns K of members and `beside`."""
         parts, sizes = [self.part(m.group) for m in members], [m.size for m in members]
         bounds = np.cumsum([0, *(part.stop - part.start for part in parts), 0 if beside is None else beside.shape[1]])
         places = [slice(int(a), int(b)) for a, b in pairwise(bounds)]
@@ -342,26 +343,26 @@ class Evidence:
         return whole, seen
 
     def strength(self, group: int, share: float) -> Array:
-        """Squares that independent parts of a form show at 1 um, over the variance of noise and background, (w,)."""
+        """Squared signal-to-noise ratio of each principal part of a form at 1 um, (w,)."""
         squares: Array = np.maximum(np.linalg.eigvalsh(self._pair(share, group, group)), 0.0)
         return squares
 
     def _products(self, share: float, group: int) -> Array:
-        """The inner products of a group's columns with all, (w, p); computed once."""
+        """Weighted inner products of a group's columns with all columns, (w, p); cached."""
         key = share, group
         if key not in self.products:
             self.products[key] = self.across(self.own(group) / self.background.variance(share)[:, None])
         return self.products[key]
 
     def _pair(self, share: float, first: int, second: int) -> Array:
-        """The inner products of two groups' columns, (v, w); computed once."""
+        """Weighted inner products of two groups' columns, (v, w); cached."""
         key = share, first, second
         if key not in self.pairs:
             self.pairs[key] = self.own(first).T @ (self.own(second) / self.background.variance(share)[:, None])
         return self.pairs[key]
 
     def _inner(self, share: float) -> DataProducts:
-        """What the data show with this share of the background; computed once."""
+        """Inner products of the data at this share of the background; cached."""
         if share not in self.inner:
             variance = self.background.variance(share)
             weighed = self.y / variance
@@ -370,7 +371,7 @@ class Evidence:
         return self.inner[share]
 
     def _blocks(self, share: float) -> Blocks:
-        """The inner products of all groups with themselves; computed once."""
+        """Weighted inner products of each group's columns with themselves; cached."""
         if share not in self.blocks:
             variance = self.background.variance(share)
             own = map(self.own, range(len(self.groups)))
@@ -378,7 +379,7 @@ class Evidence:
         return self.blocks[share]
 
     def numbers(self, members: Sequence[Member], share: float) -> list[Array]:
-        """The most probable numbers behind each member when all are fitted, per um."""
+        """The most probable independent numbers of each member, um, all members fitted together."""
         if not members:
             return []
         factor, own = self._solved(members, None, share)
@@ -388,21 +389,21 @@ class Evidence:
         return [m.size * part for m, part in zip(members, parts, strict=True)]
 
     def shown(self, members: Sequence[Member], share: float) -> list[Array]:
-        """What each member shows when all are fitted, (m,) um."""
+        """The effect of each member on the values, (m,) um, all members fitted together."""
         numbers = self.numbers(members, share)
         return [self.groups[m.group].columns @ own for m, own in zip(members, numbers, strict=True)]
 
 
 def entry_price(count: int) -> float:
-    """What so many effects pay for being there."""
+    """Price, log odds, of a set of so many effects, without the price of choosing them."""
     return SURE + (count - 1) * FURTHER if count else 0.0
 
 
 @frozen(repr=False, slots=False)
 class Comparison:
-    """Weighs sets of effects; remembers what it has weighed.
+    """Weights of sets of effects, cached.
 
-    free  what is there besides in any case, and no names to be found: constants that the machine file lacks
+    free  members of every set, not to be found: constants that the machine file lacks
     """
 
     evidence: Evidence
@@ -413,18 +414,18 @@ class Comparison:
     allowed: dict[frozenset[Member], Array | None] = field(default_factory=dict)
 
     def weight(self, members: Members) -> float:
-        """Log likelihood of the data with these members, less their prices."""
+        """Log likelihood of the data with these members, less their price."""
         key = frozenset(members.values())
         if key not in self.weights:
             self.weights[key] = self._likelihood(members) - self.paid(members)
         return self.weights[key]
 
     def sketched(self, members: Members) -> float:
-        """As `weight`, at first sight: of effects that are shaped as in the catalogue."""
+        """A quick approximation of `weight`: for effects exactly shaped as in the catalogue."""
         return self._plain(members) - self.paid(members)
 
     def paid(self, members: Members) -> float:
-        """What all members pay."""
+        """Price of all members, log odds."""
         return sum(map(self.price, members)) + entry_price(len(members))
 
     def _plain(self, members: Members) -> float:
@@ -434,7 +435,7 @@ class Comparison:
         return self.sketches[key]
 
     def _likelihood(self, members: Members) -> float:
-        """Of effects shaped as in the catalogue, or a little otherwise: either in half of all machines."""
+        """Log likelihood, averaged over effects shaped as in the catalogue and slightly misshapen ones."""
         plain, allowance = self._plain(members), self.allowance(members)
         if allowance is None:
             return plain
@@ -443,16 +444,16 @@ class Comparison:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The names to be found."""
+        """The names that may be found."""
         free = {member.group for member in self.free}
         return tuple(name for name in self.evidence.names if self.evidence.forms[name][0] not in free)
 
     def all(self, members: Members) -> list[Member]:
-        """The members and what is free."""
+        """The members, and the free ones."""
         return [*members.values(), *self.free]
 
     def price(self, name: str) -> float:
-        """What an effect pays for what it was chosen from."""
+        """Price, log odds, of choosing an effect, its form and its size among all."""
         chosen = np.log(len(self.evidence.forms[name]) * len(self.evidence.background.data.sizes))
         alternatives = self.evidence.alternatives
         return float(
@@ -460,14 +461,14 @@ class Comparison:
         )
 
     def candidate_odds(self, members: Members) -> CandidateOdds:
-        """The odds of everything beside these members."""
+        """The odds of all groups given these members; cached."""
         key = frozenset(members.values())
         if key not in self.asked:
             self.asked[key] = self.evidence.candidate_odds(self.all(members), self.allowance(members))
         return self.asked[key]
 
     def allowance(self, members: Members) -> Array | None:
-        """What the named members would show besides if their shapes differed a little, in the coordinates, (n, k)."""
+        """Columns (n, k), in the coordinates, of small changes of shape of the named members; None without any."""
         key = frozenset(members.values())
         if key not in self.allowed:
             self.allowed[key] = self._allowance(members)
@@ -483,11 +484,11 @@ class Comparison:
         return evidence.background.seen(MISSHAPEN * whole[:, None] * self._slow)
 
     def shaped(self, members: Members) -> list[Member]:
-        """The members whose shape may differ: those with a name, but constants."""
+        """The members whose shape may differ from the catalogue: named ones, without constants."""
         evidence = self.evidence
         return [each for name, each in members.items() if name in evidence.names and not evidence.constant(name)]
 
     @cached_property
     def _slow(self) -> Array:
-        """How a shape may differ, (m, k)."""
+        """Smooth factors of a change of shape, (m, k)."""
         return shape_variations(self.evidence.background.data)

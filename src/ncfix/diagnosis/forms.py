@@ -57,10 +57,10 @@ NEGLIGIBLE = 3e-3
 """Share of a form's squares that may be dropped."""
 UNSEEN_UM = 1e-9
 HOLD_POINTS = tuple(product((-0.5, 0.5), repeat=3))
-"""Where what grows is held, in times `view.FAR` its size: in the middle of each eighth of it."""
+"""Where what grows is held, in times `residual_data.HOLD_REACH`: in the middle of each eighth of it."""
 HOLD_SPREAD = 0.5 / np.sqrt(3)
 """How far from there it may be, rms, in each direction."""
-TOGETHER = 32
+BATCH = 32
 """Candidates or forms whose columns are worked out at once: of all of them these would take much memory."""
 LEAD_SHARE = 0.5
 """Share of a tilt's squares that must be the tilt, not the shifts of a pivot elsewhere: else it has no lever here."""
@@ -356,8 +356,8 @@ def _joint_forms(data: ResidualData) -> Iterator[EffectForm | None]:
 
 def _designs(data: ResidualData, effects: Sequence[Sequence[Effect]]) -> Iterator[Array]:
     """What the coefficients of each of several groups of effects show; of some groups at once."""
-    for start in range(0, len(effects), TOGETHER):
-        some = effects[start : start + TOGETHER]
+    for start in range(0, len(effects), BATCH):
+        some = effects[start : start + BATCH]
         every = data.design([effect for group in some for effect in group])
         ends = accumulate(sum(effect.basis.size for effect in group) for group in some)
         yield from np.split(every, list(ends)[:-1], axis=1)
@@ -455,8 +455,8 @@ def _not_in_catalogue(
 
 def _beside(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> Iterator[Array]:
     """What each form shows beside an orthonormal basis of what is free, in units of each value's noise."""
-    for start in range(0, len(groups), TOGETHER):
-        some = groups[start : start + TOGETHER]
+    for start in range(0, len(groups), BATCH):
+        some = groups[start : start + BATCH]
         columns = side_by_side(group.columns for group in some) / data.relative[:, None]
         yield from np.split(without(basis, columns), column_bounds(some)[1:-1], axis=1)
 

@@ -1,11 +1,11 @@
-"""What to measure next, so that names which these data leave alike come apart (T-optimal, Atkinson and Fedorov 1975).
+"""Poses to measure next, that tell apart names which the data leave ambiguous (T-optimal, Atkinson and Fedorov 1975).
 
-Each name in turn is taken for the true one, and the others are refitted to old and new rows together. The poses are
-those after which one name most likely stands alone, whichever is true: exchanged one at a time, all in place from the
-start, since the first pose with a new stylus tells nothing by itself. Where a rival imitates a name at all of the poses
-on offer, no measurement of this kind tells it from that name, and that is said.
+Each name in turn is taken as true, and the others are refitted to old and new rows together. The chosen poses are those
+after which, most likely, only one name is left, whichever is true. They are exchanged one at a time within a full set,
+since the first pose with a new tool tells nothing by itself. If a rival imitates a name at all poses on offer, no
+measurement of this kind tells them apart, and the proposal says so.
 
-Poses on offer for a further measurement, where axes and tool have been or may go, and what is new about them.
+Poses on offer lie within the travels and tools used so far, or beyond them if that is needed, which is reported.
 """
 
 from __future__ import annotations
@@ -28,50 +28,51 @@ from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.measurement import STATES, Measurement
 from ncfix.values import frozen
 
-NEAR = 10.0
-"""Log odds within which another name is near enough to ask for poses that tell them apart."""
+NEAR_LOG_ODDS = 10.0
+"""Log odds within which a rival is worth poses that tell it apart."""
 RIVALS_MOST = 3
 FORMS = 3
-"""Forms of a name that may imitate."""
-SURELY = 21.0
-"""Squared noise units from which on a rival is told apart in nineteen of twenty measurements."""
-SURE = 0.95
-"""The chance that belongs to that."""
+"""Number of forms of a name that may imitate another."""
+SURE_SQUARES = 21.0
+"""Squared difference, in units of the noise, at which a rival is told apart in 19 of 20 measurements."""
+SURE_CHANCE = 0.95
+"""The chance that corresponds to `SURE_SQUARES`."""
 FEWER = 0.8
-"""Poses that ask for more must leave so much fewer cases open, as a share."""
-HELPS = 0.05
-"""And any must raise the chance that one name stands alone by so much."""
-ALIKE = "wherever these axes go, and with other tools, they show nearly the same pattern"
+"""Poses that need more travel or tools must reduce the probability of an undecided result to this share."""
+MIN_CHANCE_GAIN = 0.05
+"""Smallest increase of the chance that a single name is left, for which poses are proposed."""
+SAME_PATTERN = "wherever these axes go, and with other tools, they show nearly the same pattern"
 ALIGNED = "the part was aligned: no poses tell them apart then; measure a square, or both diagonals with a ball-bar"
-"""Why no poses are proposed."""
+"""Reasons why no poses are proposed."""
 OFFERED = 320
-"""Poses among which those to be measured are chosen."""
+"""Number of poses on offer."""
 DRAWN, FEW = 10, 60
-"""Times as many are drawn to find those whose tip stays where it was; if these are fewer than so many, others, too."""
-LENGTHS = (100.0, 300.0)
-"""mm: a short tool, and one as long as a test mandrel; of these one more is used, that which differs most from any."""
-OTHER = 50.0
-"""mm: a tool that differs by less from one that is there adds nothing."""
-ROUNDED = 1e-3
-"""mm, degree: by which a pose may be rounded beyond a travel."""
+"""Poses drawn for each one on offer, to find some whose tool tip stays in the measured space; and the smallest number
+of such poses: with fewer, all poses are used."""
+SPARE_LENGTHS_MM = (100.0, 300.0)
+"""Lengths of a short tool and of a test mandrel; the one that differs most from the used tools is proposed."""
+OTHER_LENGTH_MM = 50.0
+"""Smallest difference in length at which a further tool is worth using."""
+ROUNDING = 1e-3
+"""Tolerance of a travel limit, mm or degree, for rounded positions."""
 Span = tuple[float, float]
 
 
 @frozen(repr=False, slots=False)
 class Proposal:
-    """Poses to be measured.
+    """Poses proposed for the next measurement.
 
-    name     the name that is to be told from its rivals
+    name     the name to be told from its rivals
     plan     rows of kind tcp without values; None if no pose helps
-    before   how well the worst rival can be told from the true name, squared noise units; after with the new poses
-    chance   how often one name stands alone afterwards, 20 to 1 likelier than the others, each as likely to be true
+    before   squared distance of the worst rival now, in units of the noise; after: with the new poses
+    chance   probability that a single name is left afterwards, 20 to 1 likelier than the others
     reason   why the data so far do not tell them apart
-    alternatives  the names that are told apart; where there is no plan, those that cannot be
-    alike    names that cannot be told from it by any of the poses, besides
-    stuck    names beside which another would stay, were they true, however often this is measured
-    beyond   axes that have to go beyond the travels measured so far
-    tools    mm: lengths of tools that were not used so far
-    strays   whether the tool tip goes where it has not been so far, seen from the workpiece
+    alternatives  the rivals that the poses tell apart; without a plan: those that cannot be told apart
+    alike    further rivals that no pose on offer tells from `name`
+    stuck    names that, if true, would keep a rival however often this is measured
+    beyond   axes that go beyond the travels measured so far
+    tools    lengths of tools that were not used so far, mm
+    strays   whether the tool tip leaves the space measured so far, in the workpiece frame
     """
 
     name: str
@@ -89,21 +90,19 @@ class Proposal:
 
     @property
     def times(self) -> int | None:
-        """How often each pose has to be measured so that this is nearly sure: what tells apart adds up; None if no
-        number would do.
-        """
+        """How often each pose must be measured for a nearly sure result (squared distances add up); None if never."""
         gained = self.after - self.before
-        return max(1, int(np.ceil((SURELY - self.before) / gained))) if gained > 0 and not self.stuck else None
+        return max(1, int(np.ceil((SURE_SQUARES - self.before) / gained))) if gained > 0 and not self.stuck else None
 
 
 def proposed(scale: Comparison, selected: Selected, sigma: float) -> Proposal | None:
-    """Poses that tell the first ambiguous name, or else the first, from those that come near; None where none does."""
+    """Poses that tell the first ambiguous name (else the first name) from its nearest rivals; None if it has none."""
     name = next((each for each in selected.named if aliases(selected, each)), selected.named[0])
     evidence = scale.evidence
     runners_up = selected.runners_up[name]
     ordered = sorted(runners_up, key=lambda n: -runners_up[n])
     owners = {group.owner.name: group.owner for group in evidence.groups}
-    near = [n for n in ordered if runners_up[n] > selected.odds[name] - NEAR and not owners[n].kept_out]
+    near = [n for n in ordered if runners_up[n] > selected.odds[name] - NEAR_LOG_ODDS and not owners[n].kept_out]
     near = [n for n in aliases(selected, name) if n in near] or near
     if not near or owners[name].kept_out:
         return None
@@ -117,7 +116,7 @@ def proposed(scale: Comparison, selected: Selected, sigma: float) -> Proposal | 
 
 
 def _side(scale: Comparison, others: Members, name: str) -> Hypothesis:
-    """A name as it would be beside the others."""
+    """A name as a hypothesis, fitted together with the members `others`."""
     evidence = scale.evidence
     members = scale.candidate_odds(others).likeliest(evidence.forms[name], FORMS)
     everyone = [*others.values(), members[0]]
@@ -126,12 +125,11 @@ def _side(scale: Comparison, others: Members, name: str) -> Hypothesis:
 
 
 def propose(evidence: Evidence, sides: Sequence[Hypothesis], sigma: float) -> Proposal:
-    """The poses that tell these names apart, whichever of them is true; the first is the one that was chosen.
+    """The poses that tell the hypotheses `sides` apart, whichever is true; the first is the selected one.
 
-    What is easy is enough if it tells them surely: the travels measured, and two tools. Else another tool more, the
-    tips of shorter tools wherever these travels lead, and the travels of the machine; and that is said. But nobody
-    knows how an effect goes on along its own axis where that was not measured: what would come of it tells no names
-    apart.
+    The measured travels with two tools suffice if they give a sure result. Otherwise one more tool, any tip position of
+    the shorter tools, and finally the full travels of the machine are tried, and the proposal says so. Axes on which an
+    effect depends keep their measured travel, since the effect is unknown beyond.
     """
     data = evidence.background.data
     spans, tools = data.measured.spans, tuple(sorted(set(np.round(data.column("tool_length"), 4).tolist())))
@@ -144,21 +142,21 @@ def propose(evidence: Evidence, sides: Sequence[Hypothesis], sigma: float) -> Pr
         found = _best_of(evidence, sides, sigma, offered)
         if best is None or 1 - found.chance < FEWER * (1 - best.chance):
             best = found
-        if best.chance >= SURE:
+        if best.chance >= SURE_CHANCE:
             break
     assert best is not None
     return best
 
 
 def _best_of(evidence: Evidence, sides: Sequence[Hypothesis], sigma: float, offered: Measurement) -> Proposal:
-    """The best of the poses on offer."""
+    """The proposal of the best poses among those on offer; without a plan if none helps."""
     rounds, everything = HypothesisPairs.of(evidence, sides, offered, sigma), list(range(len(offered)))
     index = exchanged(rounds.useful, len(offered)) if rounds.useful else everything
     chances = [float(np.mean(chance(worst(rounds.contests, rows)))) for rows in ([], index)]
     before, after = (min(worst(rounds.useful or rounds.contests, rows)) for rows in ([], index))
     name, *others = rounds.names
-    if not rounds.useful or chances[1] < chances[0] + HELPS:
-        why = ALIGNED if offered.header("setup") == "rigid" else ALIKE
+    if not rounds.useful or chances[1] < chances[0] + MIN_CHANCE_GAIN:
+        why = ALIGNED if offered.header("setup") == "rigid" else SAME_PATTERN
         return Proposal(name, None, before, after, chances[0], why, tuple(others))
     told = rounds.told_from_first
     alike = tuple(each for each in others if each not in told)
@@ -168,21 +166,21 @@ def _best_of(evidence: Evidence, sides: Sequence[Hypothesis], sigma: float, offe
 
 
 def _with_plan(proposal: Proposal, plan: Measurement, data: ResidualData) -> Proposal:
-    """A proposal with its poses, and with what is new about them."""
+    """The proposal with its poses and what is new about them: travels, tools, tip positions."""
     beyond, tools = axes_beyond(plan, data.measured.spans), new_tools(plan, data.column("tool_length"))
     strays = not stays_where_it_was(data, plan).all()
     return replace(proposal, plan=marked(plan, beyond, tools, strays), beyond=beyond, tools=tools, strays=strays)
 
 
 def _signals(sides: Sequence[Hypothesis]) -> frozenset[str]:
-    """What the effects go with."""
+    """Names of the axes and inputs on which the effects depend."""
     effects = [effect for side in sides for group, _ in side.forms for effect in group.owner.effects]
     named = (name for effect in effects for name in (effect.signal, effect.times) if name is not None)
     return frozenset(name for signal in named for name in signal.split(SUM))
 
 
 def _reason(evidence: Evidence, groups: Sequence[EffectForm]) -> str:
-    """Why the data so far leave the first of them and the others alike."""
+    """Why the data so far do not tell the first form from the others."""
     data = evidence.background.data
     turning = {any(effect.rotational for effect in group.owner.effects[:1]) for group in groups}
     if len(set(np.round(data.column("tool_length"), 3).tolist())) == 1 and len(turning) == 2:
@@ -194,22 +192,22 @@ def _reason(evidence: Evidence, groups: Sequence[EffectForm]) -> str:
 
 
 def as_objects(plan: Measurement) -> list[dict[str, float]]:
-    """The rows as objects: axis letters in mm and degree, direction of approach, tool length, load."""
+    """The rows of a plan as objects for JSON: axis positions in mm and degree, directions, tool length, load."""
     names = [name for name in plan.columns if not name.startswith("temp_") and name != "time_s"]
     return [{name: float(plan.columns[name][row]) for name in names} for row in range(len(plan))]
 
 
 def one_tool_more(tools: tuple[float, ...]) -> tuple[float, ...]:
-    """The lengths of the tools, mm, and of one that differs as much as tools do."""
+    """The lengths of the tools, mm, with one more if a clearly different one exists among `SPARE_LENGTHS_MM`."""
     if tools == (0.0,):
-        return (0.0, LENGTHS[0])
-    other = max(LENGTHS, key=lambda length: min(abs(length - own) for own in tools))
+        return (0.0, SPARE_LENGTHS_MM[0])
+    other = max(SPARE_LENGTHS_MM, key=lambda length: min(abs(length - own) for own in tools))
     apart = min(abs(other - own) for own in tools)
-    return (*tools, other) if apart >= OTHER else tools
+    return (*tools, other) if apart >= OTHER_LENGTH_MM else tools
 
 
 def travels_of(machine: Machine, spans: Mapping[str, Span], kept: Collection[str] = ()) -> dict[str, Span]:
-    """The ranges of the machine where it has them, else what was measured; the latter also of axes that are kept."""
+    """Range of each axis, mm or degree: its travel limits, or the measured span if it has none or is in `kept`."""
     found = {}
     for axis in machine.axes:
         low, high = (limit / axis.unit for limit in axis.range)
@@ -222,9 +220,9 @@ def travels_of(machine: Machine, spans: Mapping[str, Span], kept: Collection[str
 def poses_on_offer(
     data: ResidualData, ranges: Mapping[str, Span], lengths: Sequence[float], roaming: bool = False
 ) -> Measurement:
-    """Poses within these ranges, with these tools, whose tip stays where it has been if there are such.
+    """Poses within these ranges and with these tools, if possible with the tool tip in the space measured so far.
 
-    Of tools that are shorter than one that was used it may also be elsewhere where they are `roaming`.
+    roaming  tools shorter than the longest used one may leave that space
     """
     loads = data.column("load_kg")
     inputs = {"load_kg": (float(loads.min()), float(loads.max()))} if "load_kg" in data.measured.columns else {}
@@ -232,7 +230,7 @@ def poses_on_offer(
     drawn = candidates(data.machine, "tcp", DRAWN * OFFERED, room)
     inside = stays_where_it_was(data, drawn)
     if roaming:
-        inside |= drawn.column("tool_length") < data.column("tool_length").max() - ROUNDED
+        inside |= drawn.column("tool_length") < data.column("tool_length").max() - ROUNDING
     kept = drawn.rows(inside) if inside.sum() >= FEW else drawn
     plan = kept.rows(range(min(OFFERED, len(kept))))
     known = {name for each in data.measurements for name in each.columns if STATES.fullmatch(name)}
@@ -242,7 +240,7 @@ def poses_on_offer(
 
 
 def with_headers(plan: Measurement, data: ResidualData) -> Measurement:
-    """Poses with the set-up and the frame of the data, where these are of tips as well."""
+    """The plan with the headers `setup` and `frame` of the first data file of kind tcp or tcp6, if there is one."""
     like = next((each for each in data.measurements if each.kind in ("tcp", "tcp6")), None)
     for name in ("setup", "frame") if like is not None else ():
         if like is not None and like.header(name) != plan.header(name):
@@ -251,30 +249,30 @@ def with_headers(plan: Measurement, data: ResidualData) -> Measurement:
 
 
 def stays_where_it_was(data: ResidualData, plan: Measurement) -> Mask:
-    """The rows whose tool tip is within the block that it has been in so far, seen from the workpiece."""
+    """Mask of the rows whose tool tip is within the bounding box of the measured tips, in the workpiece frame."""
     been = data.machine.tip(data.q, data.column("tool_length"))
     tip = data.machine.tip(plan.positions(data.machine), plan.column("tool_length"))
-    inside: Mask = ((tip >= been.min(axis=0) - ROUNDED) & (tip <= been.max(axis=0) + ROUNDED)).all(axis=1)
+    inside: Mask = ((tip >= been.min(axis=0) - ROUNDING) & (tip <= been.max(axis=0) + ROUNDING)).all(axis=1)
     return inside
 
 
 def axes_beyond(plan: Measurement, spans: Mapping[str, Span]) -> tuple[str, ...]:
-    """The axes along which some of the poses lie beyond what was measured."""
+    """The axes that some poses move beyond the measured spans."""
     return tuple(
         name
         for name, (low, high) in spans.items()
-        if plan.column(name).min() < low - ROUNDED or plan.column(name).max() > high + ROUNDED
+        if plan.column(name).min() < low - ROUNDING or plan.column(name).max() > high + ROUNDING
     )
 
 
 def new_tools(plan: Measurement, used: Array) -> tuple[float, ...]:
-    """Lengths of tools that were not used so far, mm."""
+    """Tool lengths of the plan that were not used so far, mm."""
     lengths = set(plan.column("tool_length").tolist())
-    return tuple(sorted(each for each in lengths if np.abs(used - each).min() > ROUNDED))
+    return tuple(sorted(each for each in lengths if np.abs(used - each).min() > ROUNDING))
 
 
 def marked(plan: Measurement, beyond: Sequence[str], tools: Sequence[float] = (), strays: bool = False) -> Measurement:
-    """Poses with lines in the file that say what goes further than before, and which tools are new."""
+    """The plan with a `note` header that warns of travels beyond the measured ones and of new tools."""
     far = [*beyond, *(["the tool tip"] if strays else [])]
     said = [f"{', '.join(far)} beyond the travels measured so far, mind the clearance"] if far else []
     lengths = " and ".join(f"{each:g} mm" for each in tools)

@@ -29,8 +29,8 @@ from scipy.special import chdtrc, fdtrc
 from ncfix.arrays import Array, Mask
 from ncfix.diagnosis.effect_form import Blocks, EffectForm, block_odds, blocks_of, column_bounds, side_by_side
 from ncfix.diagnosis.evidence import (
+    BATCH,
     MISSHAPEN,
-    TOGETHER,
     Background,
     entry_price,
     in_noise,
@@ -154,7 +154,7 @@ def _everything(named: Sequence[EffectForm], shown: Iterable[Array]) -> Iterator
     forms = Counter(group.owner.name for group in named if not group.owner.constant)
     kept = ((group.owner, own) for group, own in zip(named, shown, strict=True) if not group.owner.constant)
     parts = (own / np.sqrt(forms[owner.name] * len(forms)) for owner, own in kept)
-    while some := list(islice(parts, TOGETHER)):
+    while some := list(islice(parts, BATCH)):
         yield side_by_side(some)
 
 
@@ -344,8 +344,8 @@ class PlainModel:
         solved = self.precision @ self.y - less @ (less.T @ self.y)
         total, count = float(self.y @ solved), float(len(self.y) - self.data.base.shape[1])
         best, found = LIKELY, None
-        for start in range(0, len(some), TOGETHER):
-            part = some[start : start + TOGETHER]
+        for start in range(0, len(some), BATCH):
+            part = some[start : start + BATCH]
             columns = side_by_side(group.single for group in part).astype(np.float64)
             columns *= LARGE / self.data.relative[:, None]
             inner = self._inner(dynamic, start, columns, column_bounds(part))

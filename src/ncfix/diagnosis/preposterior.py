@@ -1,10 +1,10 @@
-"""How likely further poses leave one name: what would be measured there is drawn, and each name is weighed anew.
+"""The chance that further poses leave a single name, by drawing the values that would be measured there.
 
-Preposterior analysis (Raiffa and Schlaifer 1961). A name that may be true says what the new values will be, with a
-covariance: its size and shape are known only as far as the old rows tell, the set-up will be new, the instrument has
-noise, and a little of everything goes on where nothing was measured. Values are drawn from each such prediction. The
-odds of a name afterwards are those it has now times how much likelier it makes the values than another does. So what
-the old rows happen to say is not counted a second time, and a prediction that is vague tells little.
+Preposterior analysis (Raiffa and Schlaifer 1961). Each name that may be true predicts the new values with a covariance:
+its size and shape are known as far as the old rows determine them, the set-up will be new, the instrument has noise,
+and the background of small effects is unknown where nothing was measured. Values are drawn from each prediction. The
+odds of a name afterwards are its odds now times the likelihood ratio of the new values. So the old rows are not counted
+twice, and a vague prediction tells little.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from ncfix.diagnosis.effect_form import EffectForm
 from ncfix.diagnosis.evidence import MISSHAPEN, Comparison, Member, Members
 from ncfix.diagnosis.forms import shape_variations_with
 from ncfix.diagnosis.noise import everything_at
-from ncfix.diagnosis.selection import ALIKE, ASSUMED, TOLD_APART, Selected, untold
+from ncfix.diagnosis.selection import ALIAS_LOG_ODDS, ASSUMED, TOLD_APART, Selected, untold
 from ncfix.measure.observation import Observation
 from ncfix.values import frozen
 
 FORMS = 2
-"""Forms of each name that are considered, as where names are weighed."""
+"""Number of forms of each name that are considered."""
 DRAWS = 500
-"""Draws for each name that may be true; the chance is then known to 0.02."""
+"""Number of draws for each name that may be true; the chance then has a standard error of about 0.02."""
 UNLIKELY = 5.0
-"""What is less likely than the likeliest by this log likelihood is left out."""
+"""Predictions less likely than the best by this log likelihood are left out."""
 WIDE_UM = 1e3
-"""How far what is free may be off."""
+"""Prior standard deviation of set-up and constants, um."""
 
 
 @frozen(repr=False, slots=False)
 class PredictedValues:
-    """What a name, in one form and shape, says of the new values.
+    """Predictive normal distribution of the new values for a name in one form and shape.
 
-    weight  log of how likely it is so, less what it pays
-    mean (v,), factor (v, v)  of a normal distribution, um; the factor is that of Cholesky
+    weight  log likelihood of the old values, less the price of the members
+    mean    (v,) um; factor (v, v): Cholesky factor of the covariance, um
     """
 
     name: str
@@ -48,18 +48,18 @@ class PredictedValues:
     factor: Array
 
     def likelihood(self, values: Array) -> Array:
-        """Log likelihood of values (v, d), (d,)."""
+        """Log likelihood (d,) of d draws of the values, (v, d), but for a constant."""
         white = solve_triangular(self.factor, values - self.mean[:, None], lower=True, check_finite=False)
         found: Array = -0.5 * (white**2).sum(axis=0) - np.log(np.diag(self.factor)).sum()
         return found
 
     def drawn(self, random: np.random.Generator, count: int) -> Array:
-        """Values (v, count)."""
+        """Random values (v, count), um."""
         return self.mean[:, None] + self.factor @ random.standard_normal((len(self.mean), count))
 
 
 def shown_at(new: Observation, groups: Sequence[EffectForm]) -> list[Array]:
-    """What the numbers of each form show at further poses, (v, p) um; nothing of what is no error of the machine."""
+    """Effect of the numbers of each form at further poses, (v, p) um; zero for forms that are no error of the machine."""
     owners = {group.owner.name: group.owner for group in groups if not group.owner.kept_out}
     design = new.um[:, None] * new.design([effect for owner in owners.values() for effect in owner.effects])
     ends = np.cumsum([sum(effect.basis.size for effect in owner.effects) for owner in owners.values()])
@@ -73,11 +73,11 @@ def shown_at(new: Observation, groups: Sequence[EffectForm]) -> list[Array]:
 
 @frozen(repr=False, slots=False)
 class Prospect:
-    """What may come of further poses.
+    """Expected outcome of measuring further poses.
 
-    names     that may be true
-    chances   for each name, were it true, how often it stands alone afterwards
-    weights   how likely each name is true
+    names     the names that may be true
+    chances   for each name, if it is true: probability that it is the only one left afterwards
+    weights   probability now of each name
     """
 
     names: tuple[str, ...]
@@ -86,15 +86,15 @@ class Prospect:
 
     @property
     def chance(self) -> float:
-        """How often one name stands alone, and it is the true one."""
+        """Probability that only the true name is left."""
         return float(self.weights @ self.chances)
 
 
 def prospect(scale: Comparison, selected: Selected, names: Sequence[str], new: Observation, sigma: float) -> Prospect:
-    """What further poses may come to, if one of these names is true; `sigma` is the noise of a value, um.
+    """The expected outcome of measuring `new`, if one of `names` is true; `sigma` is the noise of a value, um.
 
-    One of the names is a member of what was selected, and the other members stay. Names that act alike in old and new
-    rows together need more to be told apart, as where aliases are told.
+    One of the names is a selected member; the other members stay. Names that act alike in old and new rows together
+    need larger odds to be told apart, as in `aliases`.
     """
     own = next(name for name in names if name in selected.members)
     others = {key: member for key, member in selected.members.items() if key != own}
@@ -113,20 +113,20 @@ def prospect(scale: Comparison, selected: Selected, names: Sequence[str], new: O
             if j != k:
                 ahead, before = odds[k] - odds[j], max(apart.get(names[i], np.inf) for i in (j, k))
                 told = before + 2 * (float(ahead.mean()) - now[k] + now[j])
-                alone &= ahead > ALIKE * (ASSUMED if told < TOLD_APART else 1.0)
+                alone &= ahead > ALIAS_LOG_ODDS * (ASSUMED if told < TOLD_APART else 1.0)
         chances[k] = alone.mean()
     tempered = [(w - now[0]) / (ASSUMED if name in apart else 1.0) for name, w in zip(names, now, strict=True)]
     return Prospect(tuple(names), chances, np.exp(tempered - logsumexp(tempered)))
 
 
 def _weighed(predictions: Sequence[PredictedValues], values: Array) -> Array:
-    """How likely a name is after values (v, d), less what it pays, (d,)."""
+    """Weight (d,) of a name after d draws of the new values, (v, d)."""
     found: Array = logsumexp([each.weight + each.likelihood(values) for each in predictions], axis=0)
     return found
 
 
 class _Predictor:
-    """What names say of the values at some new poses, given the old ones."""
+    """Predictions of the values at new poses, given the old values, for a name and its companions."""
 
     def __init__(self, scale: Comparison, new: Observation, sigma: float) -> None:
         self.scale, self.new = scale, new
@@ -151,22 +151,22 @@ class _Predictor:
         self.carried: dict[float, tuple[Array, Array]] = {}
 
     def shown(self, group: int) -> Array:
-        """What the numbers of a form show in the new poses, um; nothing where it has no name."""
+        """Effect of the numbers of a form at the new poses, (v, p) um; zero for unnamed alternatives."""
         if group < len(self.named):
             return self.named[group]
         return np.zeros((len(self.variations[1]), self.scale.evidence.groups[group].width))
 
     def _carried(self, share: float) -> tuple[Array, Array]:
-        """What a little of everything carries from the old values to the new ones, (v, m), and the columns of what is
-        free, turned and weighed by the precision of the old values, (k, m).
+        """Kriging weights (v, m) of the background, from old values to new ones; and the free columns, transposed and
+        weighted by the precision of the old values, (k, m).
         """
         precision = self.background.precision(share) / self.noise
         size = share**2 * self.noise * self.background.sigma**2
         return size * self.across @ precision, self.free[0].T @ precision
 
     def predictions(self, others: Members, name: str) -> Iterator[PredictedValues]:
-        """Of a name beside others: in its likeliest forms, each shaped as in the catalogue and a little otherwise, with
-        every likely share of the background.
+        """Predictions of `name` beside the members `others`: for its likeliest forms, in the catalogue's shape and
+        slightly misshapen, with every likely share of the background.
         """
         scale, evidence = self.scale, self.scale.evidence
         asked: list[tuple[list[Member], list[Member], float, float]] = []
@@ -186,7 +186,7 @@ class _Predictor:
     def _predicted(
         self, name: str, every: Sequence[Member], weight: float, share: float, bent: Sequence[Member]
     ) -> PredictedValues:
-        """Normal predictions in closed form: columns whose numbers the old rows tell, and the background (kriging)."""
+        """The prediction in closed form: regression on the columns of the members, and kriging of the background."""
         evidence, background, data = self.scale.evidence, self.background, self.background.data
         old = [self.free[0], *(m.size * evidence.groups[m.group].columns for m in every)]
         rows = [self.free[1], *(m.size * self.shown(m.group) for m in every)]

@@ -1,10 +1,10 @@
-"""What several measurement files show of one machine: residuals, what explains them already, and where each came from.
+"""Residuals of several measurement files of one machine, and the misfit of a machine file to data.
 
-All values in um, angles as what they move at half the reach of the machine; one entry per measured value, m in all.
-`base` are the columns of what is free anyway: the unknowns of the set-ups, and the constants of the machine file
-(lines, squareness, gains), which a day and a set-up change.
+One entry per measured value, m in all, in um; angles as the displacement that they cause at half the machine's reach.
+`base` holds the columns of the parameters that are always free: the unknowns of the set-ups, and the constants of the
+machine file (location errors, squareness, gains), which vary with the day and the set-up.
 
-How well a machine file as it stands agrees with data: its constants nearly fixed, only the set-up free.
+`Misfit` tells how well a machine file agrees with data while its constants are held near the file's values.
 """
 
 from __future__ import annotations
@@ -29,44 +29,45 @@ from ncfix.values import frozen
 
 STEPS = 6
 SETTLED_UM = 1e-3
-FAR = 1.0
-"""How far from the middle of what was measured a workpiece is held, in times its size."""
+HOLD_REACH = 1.0
+"""Unit of the distance of a workpiece's fixed point from the middle of the measured points: their rms distance."""
 UNTELLABLE = 1e-5
-"""Singular values below this, of the largest, are taken for what cannot be told."""
+"""Singular values below this share of the largest count as zero: the data do not determine the combination."""
 LEAST_UM, DOUBLED = 1.5, 4
-"""The least size of an effect that is considered, and how often that is doubled on a machining centre of a metre."""
+"""The smallest size of an effect that is considered, um rms, and how often it is doubled for a machine of one metre."""
 USUAL_NOISE_UM = 3.0
-"""Noise of a value for which the least sizes that matter are stated."""
+"""Noise of a value, um, for which the smallest sizes that matter are stated."""
 TIGHT_UM = 4.0
-"""How far each constant of a machine file may have moved since, at the tool tip; as the next ones of a machining
-centre, and more on larger machines and arms."""
+"""Prior standard deviation of each constant, um at the tool tip, for a file that was right once. This and the next four
+are those of a machining centre of one metre; larger machines and arms have more."""
 AS_IT_STANDS_UM = 0.01
-"""The same where the file itself is judged."""
+"""The same if the unchanged file is judged, um."""
 USUAL_UM = 50.0
-"""How far the constants of another machine are from none."""
+"""The same for the constants of another machine, about zero, um."""
 FREE_UM = 500.0
-"""The same where they are free: no more, or what cannot be told runs away."""
+"""The same for free constants, um: finite, else undetermined combinations would run away."""
 LOOSE_UM = 200.0
-"""How far effects go that are loose besides, in one step: what the set-up may do as well is the set-up's."""
+"""Prior standard deviation of the additional `loose` effects, um: the set-up takes what both could explain."""
 WIDE_UM = 1e5
+"""Prior standard deviation of the unknowns of the set-up, um."""
 TRIM = 0.97
-"""Share of the values that count: the rest may be outliers."""
+"""Share of the values that count, the smallest residuals first: the rest may be outliers."""
 EXACT_STEPS = 4
 """Most steps of least squares on the exact model."""
 EXACT_SETTLED_UM = 0.05
-"""A step that changes no prediction by so much is the last one."""
+"""Largest change of a prediction, um, at which the iteration ends."""
 
 
 @frozen(repr=False, slots=False)
 class ResidualData:
-    """One entry per value.
+    """Residuals and their linearization; one entry per measured value.
 
     problem   the stacked observations with the free constants as unknown effects
-    coefficients, unknowns  least squares of those and of the set-up, at which everything is taken to first order
-    y         (m,) values minus what the machine file and the fitted set-up say, um
-    base      (m, k) columns of what is free
-    row       (m,) number of the row among the rows of all files; -1 for calibrated distances
-    relative  (m,) standard deviation against that of a plain value
+    coefficients, unknowns  fitted constants and set-up, about which everything is linearized
+    y         (m,) values minus the prediction of machine file and fitted set-up, um
+    base      (m, k) derivatives by the free parameters: set-up first, then constants
+    row       (m,) index of the row among the rows of all files; -1 for calibrated distances
+    relative  (m,) standard deviation of each value, relative to the median one
     """
 
     problem: Problem
@@ -79,27 +80,27 @@ class ResidualData:
 
     @property
     def sigma(self) -> float:
-        """Standard deviation of a plain value as the files tell it, um."""
+        """Standard deviation of a usual value (`relative` 1) according to the files, um."""
         return usual_noise(self.problem)
 
     @property
     def noise_stated(self) -> bool:
-        """Whether all files state it."""
+        """Whether all files state their noise."""
         return all(each.noise_stated for each in self.problem.observations)
 
     @cached_property
     def sizes(self) -> tuple[float, ...]:
-        """Sizes of an effect at the tool tip that are considered, um."""
+        """The sizes of an effect at the tool tip that are considered, um rms."""
         return tuple(LEAST_UM * 2.0**k for k in range(DOUBLED + 1 + round(np.log2(self.large))))
 
     @cached_property
     def large(self) -> float:
-        """How many times as large errors are as on a machining centre of a metre."""
+        """How many times larger errors are than on a machining centre of one metre."""
         return times_a_machining_centre(self.machine)
 
     @cached_property
     def little(self) -> float:
-        """The scale of what is too small to matter: no more than the noise makes it."""
+        """Factor on the sizes that are too small to matter; 1 for a machining centre of one metre. See `little_of`."""
         return little_of(self.machine, self.sigma)
 
     @property
@@ -109,12 +110,12 @@ class ResidualData:
 
     @property
     def measurements(self) -> list[Measurement]:
-        """The files."""
+        """The measurement files."""
         return [each.measurement for each in self.problem.observations]
 
     @property
     def count(self) -> int:
-        """How many rows there are."""
+        """Number of rows of all files."""
         return sum(len(each) for each in self.measurements)
 
     def design(self, effects: Sequence[Effect]) -> Array:
@@ -122,17 +123,18 @@ class ResidualData:
         return np.concatenate([each.um[:, None] * each.design(effects) for each in self.problem.observations])
 
     def expansion(self, drive: Sequence[Effect]) -> Array:
-        """What is seen when things on the table expand, um, (m, 4 k): the effects say with what, k coefficients.
+        """Derivative of all values by an expansion of the part on the table, um, (m, 4 k).
 
-        In turn by the tip's distance from the middle of what was measured, and by the x, y and z of the point at which
-        they are held, which nobody knows.
+        drive  effects of k coefficients that give the course of the expansion
+        The first k columns are an expansion about the middle of the measured points; the next three groups of k shift
+        the unknown fixed point in x, y and z.
         """
         parts = []
         for each in self.problem.observations:
             nominal = each.machine.nominal(each.q, each.state.tool_length)
             arm = nominal[:, :3, 3] - nominal[:, :3, 3].mean(axis=0)
             far = float(np.sqrt((arm**2).sum(axis=1).mean()))
-            ways = np.stack([arm, *(np.broadcast_to(FAR * far * way, arm.shape) for way in np.eye(3))], axis=-1)
+            ways = np.stack([arm, *(np.broadcast_to(HOLD_REACH * far * way, arm.shape) for way in np.eye(3))], axis=-1)
             turned = np.einsum("nji,njw->niw", nominal[:, :3, :3], ways)[np.maximum(each.rows, 0)]
             tip = each.design([Effect(f"E{letter}{SPINDLE}", (0.0,)) for letter in "XYZ"])
             seen = np.einsum("mk,mkw->mw", tip, turned) * (each.rows >= 0)[:, None]
@@ -144,7 +146,7 @@ class ResidualData:
         return np.concatenate(parts)
 
     def shares(self, of: Sequence[Array]) -> Array:
-        """What least squares of values (m,) give each of some columns, beside all that is free, (k, m)."""
+        """Least-squares operator (k, m): values (m,) -> coefficients of the k columns, with the base fitted as well."""
         free = np.concatenate([self.base, *of], axis=1) / self.relative[:, None]
         size = np.linalg.norm(free, axis=0)
         size = np.where(size > 0, size, 1.0)
@@ -158,7 +160,7 @@ class ResidualData:
         return np.concatenate([each.q for each in self.problem.observations])
 
     def column(self, name: str) -> Array:
-        """A state column (n,) of all rows, zero where a file lacks it; directions as the kind of measurement says."""
+        """A state column (n,) of all rows, zero for files without it; directions of approach as in `directions`."""
         axis = name.removeprefix("dir_")
         if axis != name and axis in self.machine.axis_names:
             return self.directions[:, self.machine.axis_names.index(axis)]
@@ -166,13 +168,13 @@ class ResidualData:
 
     @cached_property
     def directions(self) -> Array:
-        """(n, n_axes) in which the axes came to all rows, zero where that is not known."""
+        """Direction of approach of each axis in each row, (n, n_axes): 1, -1, or 0 if unknown."""
         own = [np.broadcast_to(each.state.direction, each.q.shape) for each in self.problem.observations]
         return np.concatenate(own).astype(np.float64)
 
     @cached_property
     def component(self) -> Ints:
-        """Number of the component of each value in its row; -1 for calibrated distances."""
+        """Index of the component of each value within its row; -1 for calibrated distances."""
         parts = []
         for each in self.problem.observations:
             own = np.tile(np.arange(len(each.components)), len(each.measurement))
@@ -181,7 +183,7 @@ class ResidualData:
 
     @cached_property
     def names(self) -> list[str]:
-        """The name of what each value is."""
+        """Name of the measured quantity of each value."""
         return [
             name
             for each in self.problem.observations
@@ -190,12 +192,12 @@ class ResidualData:
 
     @cached_property
     def file(self) -> Ints:
-        """Number of the file of each row."""
+        """Index of the file of each row."""
         return np.repeat(np.arange(len(self.measurements)), [len(each) for each in self.measurements])
 
     @cached_property
     def sets(self) -> tuple[str, ...]:
-        """File and set of each row."""
+        """Name of the set of each row, with its file if there are several."""
         many = len(self.measurements) > 1
         return tuple(
             f"{each.path} set {name}" if many else f"set {name}" for each in self.measurements for name in each.sets
@@ -203,25 +205,25 @@ class ResidualData:
 
     @cached_property
     def views(self) -> Ints:
-        """Number of the sort of row of each value, (m,): rows of one file in which the same was read."""
+        """Index of the sort of row of each value, (m,): a sort is the rows of one file with the same quantities."""
         sorts = [f"{file} {name}" for file, name in zip(self.file, self._first_names, strict=True)]
         return groups(sorts)[1][np.maximum(self.row, 0)]
 
     @property
     def _first_names(self) -> list[str]:
-        """Of each row what its first value is."""
+        """Name of the first quantity of each row."""
         seen = self.problem.observations
         return [name for each in seen for name in each.value_names[:: len(each.components)]]
 
     def size(self, values: Array, keep: Mask | None = None) -> float:
-        """How large something is that is shown like this, um: `rms` over the sort of rows in which it is largest.
+        """Size of an effect on the values, um: `rms` over the sort of rows in which it is largest.
 
-        Rows of another sort do not make it smaller, however many there are.
+        Rows of other sorts, however many, do not make it smaller.
         """
         return float(self.size_by_view(values, keep).max(initial=0.0))
 
     def size_by_view(self, values: Array, keep: Mask | None = None) -> Array:
-        """`rms` over each sort of rows by itself, (views,); zero where no row is in `keep`."""
+        """`rms` over each sort of rows, (views,); zero for sorts without a row in `keep`."""
         inside = self._inside if keep is None else self._inside & keep
         squares = (values**2).reshape(len(values), -1).sum(axis=1)
         rows = np.unique(self.row[inside], return_index=True)[1] if keep is not None else self._firsts
@@ -230,24 +232,24 @@ class ResidualData:
         return np.sqrt(total / np.maximum(np.bincount(self.views[inside][rows], minlength=count), 1))
 
     def rms(self, values: Array, keep: Mask | None = None) -> float:
-        """Root mean square over rows of the length of what each shows; values (m, ...), um, those in `keep` (m,)."""
+        """Root mean square over rows of the length of each row's vector of values (m, ...), um, of those in `keep`."""
         inside = self._inside if keep is None else self._inside & keep
         rows = len(self._firsts) if keep is None else len(np.unique(self.row[inside]))
         return float(np.linalg.norm(values if inside.all() else values[inside]) / np.sqrt(max(rows, 1)))
 
     @cached_property
     def _inside(self) -> Mask:
-        """(m,) whether a value is of a row."""
+        """(m,) whether a value belongs to a row: all but calibrated distances."""
         return self.row >= 0
 
     @cached_property
     def _firsts(self) -> Ints:
-        """Of the values of rows the first of each row."""
+        """Index of the first value of each row, among the values of rows."""
         return np.unique(self.row[self._inside], return_index=True)[1]
 
     @cached_property
     def measured(self) -> MeasuredRange:
-        """What was measured."""
+        """The range of axes, inputs and time that was measured."""
         units = np.array([axis.unit for axis in self.machine.axes])
         places = np.concatenate([*self._ends, self.q]) / units
         spans = dict(
@@ -263,7 +265,7 @@ class ResidualData:
         return MeasuredRange(self.machine, spans, frozenset(moving), (float(time.min()), float(time.max())), warmth)
 
     def unstated(self, axis: Axis) -> list[str]:
-        """The files that moved an axis and do not say from where it came, where others do."""
+        """Paths of the files that moved an axis without stating its direction of approach, if other files state it."""
         index = self.machine.axis_names.index(axis.name)
         if not self.directions[:, index].any():
             return []
@@ -280,10 +282,10 @@ class ResidualData:
 
 
 def residual_data(measurements: Sequence[Measurement], machine: Machine) -> ResidualData:
-    """Fit what is free, and take everything else to first order about it.
+    """Fit set-up and constants, and linearize about the fit.
 
-    Constants that the data cannot tell are held as `calibrate` holds them, with the Jacobian at the first guess: else
-    what cannot be told at all would be told by second order, and run away.
+    Constants that the data cannot determine are held, as in `calibrate`, by the Jacobian at the first guess. Otherwise
+    second-order terms would seem to determine them, and they would run away.
     """
     selection = Selection(machine.effects, tuple(is_free(effect) for effect in machine.effects))
     problem = Problem.of(measurements, machine, selection)
@@ -306,18 +308,18 @@ def residual_data(measurements: Sequence[Measurement], machine: Machine) -> Resi
 
 
 def usual_noise(problem: Problem) -> float:
-    """Standard deviation of a plain value as the files tell it, um; of those that do not only where none does."""
+    """Median standard deviation of the values, um, of the files whose noise is known; of all files if none is."""
     known = [each.um * each.sigma for each in problem.observations if each.noise_known]
     return float(np.median(np.concatenate(known) if known else problem.um * problem.sigma))
 
 
 def little_of(machine: Machine, noise_um: float) -> float:
-    """How many times as large as on a machining centre an error is that does not matter, measured with this noise."""
+    """Factor on the sizes that are too small to matter: grows with the machine, but no further than with the noise."""
     return min(times_a_machining_centre(machine), max(1.0, noise_um / USUAL_NOISE_UM))
 
 
 def relative_noise(problem: Problem) -> Array:
-    """Standard deviation of each value against the usual one, (m,); files that do not tell are like those that do."""
+    """Standard deviation of each value relative to the median, (m,); files of unknown noise count like the others."""
     usual = usual_noise(problem)
     noise = [(each.um * each.sigma, each.noise_known) for each in problem.observations]
     sigma = np.concatenate([own if known else own * usual / np.median(own) for own, known in noise])
@@ -326,7 +328,7 @@ def relative_noise(problem: Problem) -> Array:
 
 
 def damped(columns: Array, y: Array) -> Array:
-    """Least squares of columns (m, k) to y (m,), in which what the data hardly tell stays zero: (k,)."""
+    """Least squares of columns (m, k) to y (m,), (k,); combinations that the data hardly determine stay zero."""
     size = np.sqrt((columns**2).mean(axis=0))
     size = np.where(size > 0, size, 1.0)
     left, values, right = np.linalg.svd(columns / size, full_matrices=False)
@@ -336,7 +338,7 @@ def damped(columns: Array, y: Array) -> Array:
 
 
 def is_free(effect: Effect) -> bool:
-    """Whether an effect is a constant of the set-up and the day: where an axis lies, or a gain."""
+    """Whether an effect is a constant that set-up and day may change: a location error, or a gain."""
     if effect.input is not None or effect.times is not None:
         return False
     if isinstance(effect.basis, ConstantBasis):
@@ -345,7 +347,7 @@ def is_free(effect: Effect) -> bool:
 
 
 def rows_of(problem: Problem) -> Ints:
-    """(m,) the row of each value among those of all files; -1 for calibrated distances."""
+    """(m,) index of the row of each value among the rows of all files; -1 for calibrated distances."""
     rows, first = [], 0
     for each in problem.observations:
         rows.append(np.where(each.rows < 0, -1, each.rows + first))
@@ -355,13 +357,13 @@ def rows_of(problem: Problem) -> Ints:
 
 @frozen(slots=False)
 class Misfit:
-    """A machine file against data.
+    """The misfit of a machine file to data.
 
-    problem   what is fitted: the set-up, constants of the file, and effects that are `loose` besides
-    relative  (m,) standard deviation of each value against that of a plain one
-    noise     of the instrument, um
-    loose     how many coefficients are free besides
-    fits      what is left and the constants for each prior that was asked, computed once
+    problem   the fit: set-up, constants of the file, and additional `loose` effects
+    relative  (m,) standard deviation of each value relative to the median
+    noise     noise of the instrument, um
+    loose     number of coefficients of the loose effects, the last ones
+    fits      cache: prior, um -> (residual, um; constants)
     """
 
     problem: Problem
@@ -371,32 +373,35 @@ class Misfit:
     fits: dict[float, tuple[float, Array]] = field(default_factory=dict)
 
     def left(self, prior_um: float = TIGHT_UM) -> float:
-        """Root mean square of residual values, um, without the largest; what constants moved is counted as misfit."""
+        """Root mean square residual, um, without the largest; changes of constants, against the prior, count as misfit.
+
+        prior_um  standard deviation of the constants at the tool tip, for a machining centre of one metre
+        """
         return self._fitted(prior_um)[0]
 
     @property
     def count(self) -> int:
-        """How many values count."""
+        """Number of values that count."""
         return int(TRIM * len(self.relative))
 
     @property
     def free(self) -> float:
-        """What is left with the constants free."""
+        """Residual with free constants, um."""
         return self.left(FREE_UM)
 
     @property
     def constants(self) -> Array:
-        """The constants of the file where the data have them."""
+        """The constants as the data have them, mm or rad."""
         return self._fitted(USUAL_UM)[1]
 
     @property
     def coefficients(self) -> Array:
-        """The constants that are loose."""
+        """The fitted coefficients of the loose effects."""
         every = self._fitted(TIGHT_UM)[1]
         return every[len(every) - self.loose :]
 
     def _fitted(self, prior_um: float) -> tuple[float, Array]:
-        """What is left and the constants, held as far as errors of this machine are larger than of others."""
+        """Residual, um, and constants, with a prior scaled to this machine's size."""
         if prior_um not in self.fits:
             large = times_a_machining_centre(self.problem.machine)
             self.fits[prior_um] = _fitted(
@@ -406,7 +411,7 @@ class Misfit:
 
 
 def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequence[Effect] = ()) -> Misfit:
-    """Ready to be asked."""
+    """The misfit of a machine to measurements, to be fitted when asked; `loose`: additional effects to fit."""
     selection = Selection((*machine.effects, *loose), tuple(map(is_free, (*machine.effects, *loose))))
     problem = Problem.of(measurements, machine, selection)
     free = sum(effect.basis.size for effect in loose)
@@ -416,7 +421,7 @@ def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequenc
 def _fitted(
     problem: Problem, relative: Array, sigma: float, prior_um: float, free: int, loose_um: float
 ) -> tuple[float, Array]:
-    """Least squares with a prior on the constants, on the exact model."""
+    """Residual, um, and coefficients by least squares on the exact model, with priors on all but the set-up."""
     start, k, scale = problem.selection.start, len(problem.start), problem.um / relative
     held: Array
 

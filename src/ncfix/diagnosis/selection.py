@@ -1,19 +1,16 @@
-"""Names that act in the same way in these data: what the one shows, the other can show, whatever else it might.
+"""Selection of the effects that the data support, their aliases, and the size from which an effect would be found.
 
-A spindle that grows and a frame that drifts along a tool that never turns differ in the course that is assumed of them,
-a bed and a ram that sag in the power of their curve. Odds between such names are odds of what is assumed.
+Selection. The set of effects with the largest weight (evidence.py), found by adding, exchanging and dropping one at a
+time. Constants that the machine file lacks (location errors, gains) are free while other effects are sought, since
+every machine has them and almost any curve looks like one in part. Which of them are there is decided afterwards.
 
-Which effects are there: the set that weighs most, found by adding, exchanging and dropping one at a time.
+Aliases. Two names act alike in these data if one can imitate the other: growth of a spindle and drift of a frame along
+a tool that never turns differ only in their assumed course in time, sag of a bed and of a ram only in the power of a
+curve. Odds between such names rest on assumptions, and count less.
 
-Constants of the machine that its file lacks: where axes lie, gains. They go before all that is not one.
-
-Every machine has them, and almost any curve or sag looks like one in part. So names of other effects are looked for
-with all of them free; which constants are there is asked afterwards, beside what was found.
-
-What these data would have shown: how large an effect has to be so that it is found. Silence means no more than that.
-
-The numbers behind an effect of size s have variance s^2. With d the squares that each of its independent parts shows at
-a size of one, over the variance of noise and background, its log odds are 1/2 sum(s^2 d - ln(1 + s^2 d)) on average.
+Findable sizes. An effect of size s has coefficients of variance s^2. With d the squared signal-to-noise ratio of each
+of its independent parts at size one, its log odds are on average 1/2 sum(s^2 d - ln(1 + s^2 d)). It would be found if
+these exceed its price; a diagnosis that finds nothing excludes no smaller effects.
 """
 
 from __future__ import annotations
@@ -29,47 +26,48 @@ from ncfix.measure.least_squares import orthonormal, without
 from ncfix.values import frozen
 
 OVERLAP = 0.25
-"""Share of what a name shows that another must be able to show to be an alias, however likely it is in its place."""
+"""Smallest share of a member's effect on the data that another name must be able to show, to be its alias."""
 TOLD_APART = 6.0
-"""Squared noise units of what the first shows that the second cannot, from which on data tell them apart."""
-DOUBT = 3.0
-"""Standard deviations of what noise shows, on top of its mean, that are no such squares."""
-MOST = 5
-"""Effects that are taken to be there at most."""
+"""Squared effect, in units of the noise, of a member that another name cannot show, from which data tell them apart."""
+NOISE_SIGMAS = 3.0
+"""Standard deviations, above its mean, of the squared effect that noise alone causes; only the excess counts."""
+MAX_EFFECTS = 5
+"""Largest number of effects in a set."""
 TRIED = 5
-"""Of all effects that may be added so many, the likeliest, are weighed; of those without a name, half as many."""
+"""Number of effects, the likeliest, that are tried as additions; of unnamed alternatives half as many."""
 FORMS = 2
-"""Forms of another name that are weighed in a member's place."""
-ALIKE = 3.0
-"""Log odds (20 to 1) within which another name explains a member's part as well."""
+"""Number of forms of another name that are tried in a member's place."""
+ALIAS_LOG_ODDS = 3.0
+"""Log odds (20 to 1) within which another name explains the same data as well."""
 ASSUMED = 3.0
-"""So much less count odds between names that act in the same way: they rest on courses and shapes that are assumed."""
+"""Factor on `ALIAS_LOG_ODDS` for names that act alike, whose odds rest on assumed courses and shapes."""
 NO_BETTER = 1.0
-"""Log odds within which a name is no better than one that consists of a part of its errors only."""
-TOGETHER = 3
-"""Names that are tried as a whole where none helps by itself."""
-NEARLY = 20.0
-"""Log odds within which these must come to what is there, before they are helped by what has no name."""
+"""Log odds within which a name made of fewer errors is preferred."""
+TRIED_JOINTLY = 3
+"""Number of names that are added together if none helps by itself."""
+WORTH_CLIMBING = 20.0
+"""Log odds below the best set within which such a joint set is improved further, with unnamed alternatives."""
 WEIGHED = 5
-"""Of all changes so many, the best at first sight, are weighed with all care."""
-HELPS = 0.1
-"""Log odds by which a change must help."""
+"""Number of changes, the best at first sight, whose weight is computed exactly."""
+MIN_GAIN = 0.1
+"""Log odds that a change of the set must gain."""
 CONSTANT_UM = 300.0
-"""How far they may be off while they are free, on a machining centre."""
+"""Standard deviation of the lacking constants while they are free, um at the tool tip, for a machining centre."""
 FEW_SHOWN = 0.5
-"""Share of the names that these poses can show which must be found at the largest size: else it is hardly anything."""
+"""If less than this share of the visible names is findable at the largest size, the data show hardly anything."""
 
 
 def untold(scale: Comparison, selected: Selected, name: str, other: str) -> float:
-    """Squared noise units of what a member shows that another name cannot, with its best form, beyond what noise may
-    bring; zero where the errors of both, as fitted to these data, are the same but for noise.
+    """Squared effect of member `name` that the best form of `other` cannot imitate, in units of the noise.
+
+    Less what noise alone may cause; zero if both are the same within the noise.
     """
     return _untold(scale.evidence, scale.all(selected.members), selected.members[name], other)
 
 
 def _untold(evidence: Evidence, members: Sequence[Member], own: Member, other: str) -> float:
-    """With numbers z = P K'y behind all members K, P = (1 + K'K)^-1, of which noise alone has the covariance P K'K P:
-    a member of many numbers shows a little of each by noise, and none of that tells it from a name of fewer.
+    """As `untold`. The numbers of all members are z = P K'y with P = (1 + K'K)^-1; noise alone gives them the
+    covariance P K'K P. A member with many numbers thus shows a little of each by noise, which does not distinguish it.
     """
     share, place = evidence.share(members), list(members).index(own)
     parts = [member.size * _white(evidence, member.group, share) for member in members]
@@ -83,13 +81,13 @@ def _untold(evidence: Evidence, members: Sequence[Member], own: Member, other: s
     for form in evidence.forms[other]:
         left = _unexplained(parts[place], evidence.background.data.sizes[-1] * _leading(evidence, form, share))
         by_noise = left @ spread
-        usual = np.trace(by_noise) + DOUBT * np.sqrt(2 * np.trace(by_noise @ by_noise))
+        usual = np.trace(by_noise) + NOISE_SIGMAS * np.sqrt(2 * np.trace(by_noise @ by_noise))
         beyond.append(float(numbers @ left @ numbers) / noise - float(usual))
     return max(min(beyond), 0.0)
 
 
 def _overlap(evidence: Evidence, members: Sequence[Member], own: Member, other: str) -> bool:
-    """Whether a name can show some of what `own`, one of the members, shows: else it acts in other directions."""
+    """Whether name `other` can imitate at least a share `OVERLAP` of the effect of the member `own`."""
     share = evidence.share(members)
     shown = _white(evidence, own.group, share) @ evidence.numbers(members, share)[list(members).index(own)]
     by = (_white(evidence, form, share) for form in evidence.forms[other])
@@ -97,15 +95,14 @@ def _overlap(evidence: Evidence, members: Sequence[Member], own: Member, other: 
 
 
 def _white(evidence: Evidence, group: int, share: float) -> Array:
-    """The columns of a form in units of noise and background, (n, p)."""
+    """The columns (n, p) of a form, whitened by noise and background."""
     return evidence.own(group) / np.sqrt(evidence.background.variance(share))[:, None]
 
 
 def _leading(evidence: Evidence, group: int, share: float) -> Array:
-    """As `_white`, of the effect itself, each column 1 um at the tool tip.
+    """Like `_white`, for the leading effects of a form only, each column scaled to 1 um at the tool tip.
 
-    Its shape in the catalogue does not count, nor what only comes with it, as a constant with a play, which stands in
-    no name's place.
+    Accompanying effects, such as the constant of a play, cannot take the place of a name.
     """
     form, background = evidence.groups[group], evidence.background
     sizes, effects = np.sqrt((form.columns**2).sum(axis=0)), form.owner.effects[: form.owner.lead]
@@ -119,27 +116,28 @@ def _leading(evidence: Evidence, group: int, share: float) -> Array:
 
 
 def _unexplained(shown: Array, sized: Array) -> Array:
-    """Inner products (k, k) of what of some columns (n, k) others of the largest size cannot show, and of the numbers
-    behind those. Without the latter a combination that hardly shows could stand for anything.
+    """Inner products (k, k) of the part of columns (n, k) that columns `sized` (n, p) cannot show.
+
+    The coefficients of `sized` have unit variance, else a combination that hardly shows could imitate anything.
     """
     seen = sized.T @ shown
     return shown.T @ shown - seen.T @ np.linalg.solve(np.eye(sized.shape[1]) + sized.T @ sized, seen)
 
 
 def _shared(columns: Array, by: Array) -> float:
-    """Share of the squares of some columns that others can show."""
+    """Share of the squares of `columns` that lies in the span of `by`."""
     return 1.0 - float((without(orthonormal(by), columns) ** 2).sum() / (columns**2).sum())
 
 
 @frozen(slots=False)
 class Selected:
-    """The effects that are there, likeliest first, with what was considered.
+    """The selected effects, likeliest first, and what could stand in their place.
 
     members   name -> form and size
-    odds      name -> log odds that it is there, the others given; what it was chosen from is counted
-    runners_up  name -> {other name: log odds of that one in its place}
-    alternatives  the keys of members that have no name
-    acting_alike  name -> those of its runners-up that act in the same way in these data
+    odds      name -> log odds that it is there, given the others, less the price of choosing it
+    runners_up  name -> {other name: log odds of the other in its place}
+    alternatives  keys of all unnamed alternatives
+    acting_alike  name -> those of its runners-up that act alike in these data
     """
 
     members: dict[str, Member]
@@ -150,77 +148,77 @@ class Selected:
 
     @property
     def named(self) -> list[str]:
-        """The members that have a name."""
+        """The named members."""
         return [name for name in self.members if name not in self.alternatives]
 
     @property
     def unnamed(self) -> list[str]:
-        """The members that have none."""
+        """The unnamed members."""
         return [name for name in self.members if name in self.alternatives]
 
     def p_value(self, name: str) -> float:
-        """A bound on the probability that noise alone gives any name such odds."""
+        """Upper bound of the probability that noise alone gives any name such odds."""
         return float(np.exp(-max(self.odds[name], 0.0)))
 
 
 def select(scale: Comparison, offered: Sequence[str], start: Members | None = None) -> dict[str, Member]:
-    """The members that weigh most together; those of `start` stay.
+    """The set of members with the largest weight; those of `start` stay.
 
-    When nothing helps any more each member is taken away in turn and may not come back, and it is looked whether
-    others do better: two may stand where one came in first. And before something is said to have no name, several names
-    are tried that do it only together.
+    When no change helps any more, each member is excluded in turn and the search repeated without it, since two others
+    may do better than the one that came first. Before an unnamed alternative is accepted, several names that help only
+    together are tried.
     """
     fixed = dict(start or {})
     members = _climbed(scale, offered, fixed, fixed)
     for out in [name for name in members if name not in fixed]:
         others = _less(members, out)
-        found = _climbed(scale, [name for name in offered if name != out], others, fixed)
-        members = _better(scale, members, found)
+        without_it = _climbed(scale, [name for name in offered if name != out], others, fixed)
+        members = _better(scale, members, without_it)
     if any(name in scale.evidence.alternatives for name in members if name not in fixed):
-        found = _climbed(scale, names_of(scale, offered), _together(scale, offered, fixed), fixed)
-        if scale.weight(found) > scale.weight(members) - NEARLY:
-            members = _better(scale, members, _climbed(scale, offered, found, fixed))
+        named = _climbed(scale, names_of(scale, offered), _together(scale, offered, fixed), fixed)
+        if scale.weight(named) > scale.weight(members) - WORTH_CLIMBING:
+            members = _better(scale, members, _climbed(scale, offered, named, fixed))
     return members
 
 
 def _better(scale: Comparison, members: dict[str, Member], trial: dict[str, Member]) -> dict[str, Member]:
-    return trial if scale.weight(trial) > scale.weight(members) + HELPS else members
+    return trial if scale.weight(trial) > scale.weight(members) + MIN_GAIN else members
 
 
 def _together(scale: Comparison, offered: Sequence[str], members: Members) -> dict[str, Member]:
-    """Some names more, the likeliest one after another, whether they help or not."""
+    """Members plus `TRIED_JOINTLY` names, the likeliest one after another, whether they help or not."""
     names, found = names_of(scale, offered), dict(members)
-    for _ in range(TOGETHER):
+    for _ in range(TRIED_JOINTLY):
         tried = [{**found, name: each} for name, each in likeliest(scale, names, found).items()]
         found = max(tried, key=scale.weight, default=found)
     return found
 
 
 def names_of(scale: Comparison, offered: Sequence[str]) -> list[str]:
-    """Those on offer that have a name."""
+    """The named effects among `offered`."""
     return [name for name in offered if name in scale.evidence.names]
 
 
 def _climbed(scale: Comparison, offered: Sequence[str], members: Members, fixed: Members) -> dict[str, Member]:
-    """The best of all changes, again and again until none helps."""
+    """Members improved by the best change, repeatedly, until no change helps."""
     while True:
         best = max(_promising(scale, _changes(scale, offered, members, fixed), members), key=scale.weight)
-        if scale.weight(best) <= scale.weight(members) + HELPS:
+        if scale.weight(best) <= scale.weight(members) + MIN_GAIN:
             return dict(members)
         members = best
 
 
 def _promising(scale: Comparison, changes: list[dict[str, Member]], members: Members) -> list[dict[str, Member]]:
-    """All changes that only leave effects away, and the best of the others at first sight."""
+    """All changes that only drop effects, and the best of the others at first sight."""
     fewer = [each for each in changes if len(each) <= len(members) and set(each) <= set(members)]
     other = [each for each in changes if each not in fewer]
     return fewer + sorted(other, key=scale.sketched, reverse=True)[:WEIGHED]
 
 
 def _changes(scale: Comparison, offered: Sequence[str], members: Members, fixed: Members) -> list[dict[str, Member]]:
-    """One effect more, another in the place of one, or one less."""
+    """All sets with one effect added, exchanged or dropped."""
     found = [dict(members)]
-    if len(members) < MOST:
+    if len(members) < MAX_EFFECTS:
         found += [{**members, name: each} for name, each in likeliest(scale, offered, members).items()]
     for out in members:
         if out not in fixed:
@@ -230,7 +228,7 @@ def _changes(scale: Comparison, offered: Sequence[str], members: Members, fixed:
 
 
 def likeliest(scale: Comparison, offered: Sequence[str], members: Members) -> dict[str, Member]:
-    """The effects that have the best odds beside some members, in their likeliest form and size."""
+    """The effects with the best odds given some members, each in its likeliest form and size."""
     odds, evidence = scale.candidate_odds(members), scale.evidence
     free = {name: odds.of(evidence.forms[name]) for name in offered if name not in members}
     order = sorted(free, key=lambda name: -free[name])
@@ -240,7 +238,7 @@ def likeliest(scale: Comparison, offered: Sequence[str], members: Members) -> di
 
 
 def with_alternatives(scale: Comparison, members: Members) -> Selected:
-    """What else could stand in each member's place."""
+    """The members with their odds, and with the other names that could stand in each one's place."""
     evidence, members = scale.evidence, _formed(scale, members)
     odds: dict[str, float] = {}
     runners_up: dict[str, dict[str, float]] = {}
@@ -258,7 +256,7 @@ def with_alternatives(scale: Comparison, members: Members) -> Selected:
         paid = entry_price(len(members)) - entry_price(len(others))
         odds[name] = gained.pop(name) + paid
         runners_up[name] = {each: value + paid for each, value in gained.items()}
-        near = [each for each, value in runners_up[name].items() if value > odds[name] - ASSUMED * ALIKE]
+        near = [each for each, value in runners_up[name].items() if value > odds[name] - ASSUMED * ALIAS_LOG_ODDS]
         there = scale.all(members)
         for other in [each for each in near if not _overlap(evidence, there, members[name], each)]:
             del runners_up[name][other]
@@ -272,18 +270,20 @@ def with_alternatives(scale: Comparison, members: Members) -> Selected:
 
 
 def plainest(scale: Comparison, selected: Selected) -> Selected:
-    """With names that consist of fewer errors where they say as much: a backlash in the place of an angular play with
-    one lever, which brings a backlash; and in the place of one that claims what no data show, any alias that does not:
-    of a straightness alone nobody can say that a sag brings it.
+    """Replace names by aliases that claim less, if these explain the data about as well.
+
+    An alias of fewer errors is preferred: a backlash to an angular play with a single lever. An alias is also preferred
+    to a name that includes errors which the data do not show at all: a measured straightness alone does not show a sag.
     """
     evidence = scale.evidence
     for name in selected.named:
         others, alike = _less(selected.members, name), selected.acting_alike[name]
         claims = _claims(evidence, selected.members[name].group)
+        least = selected.odds[name] - ASSUMED * (ALIAS_LOG_ODDS if claims else NO_BETTER)
         fewer = {
             each: selected.runners_up[name][each]
             for each in sorted(alike)
-            if selected.runners_up[name][each] > selected.odds[name] - ASSUMED * (ALIKE if claims else NO_BETTER)
+            if selected.runners_up[name][each] > least
             and (
                 not _claims(evidence, evidence.forms[each][0])
                 if claims
@@ -293,18 +293,18 @@ def plainest(scale: Comparison, selected: Selected) -> Selected:
         if fewer:
             plain = max(fewer, key=lambda each: fewer[each])
             forms = scale.candidate_odds(others).likeliest(evidence.forms[plain], FORMS)
-            found = ({**others, plain: form} for form in forms)
-            selected = with_alternatives(scale, max(found, key=scale.weight))
+            plainer = ({**others, plain: form} for form in forms)
+            selected = with_alternatives(scale, max(plainer, key=scale.weight))
     return selected
 
 
 def _errors(evidence: Evidence, name: str) -> set[str]:
-    """The errors that a name consists of."""
+    """ISO 230-1 names of the errors that an effect consists of."""
     return {effect.name for effect in evidence.groups[evidence.forms[name][0]].owner.effects}
 
 
 def _claims(evidence: Evidence, group: int) -> bool:
-    """Whether an effect itself, in this form, consists of errors of which the data show some and others not at all."""
+    """Whether the leading effects of a form include errors that the data do not show at all."""
     form, data = evidence.groups[group], evidence.background.data
     effects = () if form.owner.grows else form.owner.effects[: form.owner.lead or None]
     starts = np.cumsum([0, *(effect.basis.size for effect in effects)])
@@ -313,9 +313,9 @@ def _claims(evidence: Evidence, group: int) -> bool:
 
 
 def _formed(scale: Comparison, members: Members) -> dict[str, Member]:
-    """Each member in the heaviest of its likeliest forms, as others are weighed in its place.
+    """Each member in the form of the largest weight, as its rivals are weighed.
 
-    It came in with the form that was likeliest while the background had to explain it, too.
+    It was chosen with the form that was likeliest while the background still had to explain part of it.
     """
     found = dict(members)
     for name in members:
@@ -325,7 +325,7 @@ def _formed(scale: Comparison, members: Members) -> dict[str, Member]:
 
 
 def _sort(evidence: Evidence, name: str) -> Sequence[str]:
-    """What could stand in its place: rivals for a rival, constants for a constant."""
+    """The names that could stand in its place: unnamed alternatives, constants or other effects, as it is itself."""
     if name not in evidence.names:
         return evidence.alternatives
     return [each for each in evidence.names if evidence.constant(each) == evidence.constant(name)]
@@ -336,14 +336,18 @@ def _less(members: Members, out: str) -> dict[str, Member]:
 
 
 def aliases(selected: Selected, name: str) -> list[str]:
-    """Names that explain a member's part nearly as well, or act in the same way."""
+    """Names that explain a member's data nearly as well, likeliest first; more tolerant for names that act alike."""
     rest, acting_alike = selected.runners_up[name], selected.acting_alike.get(name, frozenset())
-    found = [key for key in rest if rest[key] > selected.odds[name] - ALIKE * (ASSUMED if key in acting_alike else 1.0)]
+    found = [
+        key
+        for key in rest
+        if rest[key] > selected.odds[name] - ALIAS_LOG_ODDS * (ASSUMED if key in acting_alike else 1.0)
+    ]
     return sorted(found, key=lambda key: -rest[key])
 
 
 def with_constants_free(evidence: Evidence) -> Comparison:
-    """A scale on which the lacking constants are as free as those that the file has."""
+    """A comparison in which the constants that the file lacks are free, like those that it has."""
     free_um = CONSTANT_UM * evidence.background.data.large
     return Comparison(
         evidence,
@@ -352,10 +356,10 @@ def with_constants_free(evidence: Evidence) -> Comparison:
 
 
 def with_constants(scale: Comparison, members: Members) -> dict[str, Member]:
-    """The members and the constants that are there.
+    """The members together with the lacking constants that the data support.
 
-    Constants are looked for beside what has no name, before other names have taken their part; with those they leave
-    only where the data speak against them.
+    Constants are sought beside the unnamed members only, before other names take their part. Beside all members they
+    are dropped only if the data speak against them.
     """
     evidence = scale.evidence
     offered = [name for name in evidence.names if evidence.constant(name)]
@@ -371,13 +375,13 @@ def with_constants(scale: Comparison, members: Members) -> dict[str, Member]:
 
 
 def findable_sizes(scale: Comparison) -> dict[str, float]:
-    """The smallest of the sizes, um rms, at which an effect of each name would be found; inf where it is at none."""
+    """For each name the smallest of the considered sizes, um rms, at which it would be found; inf if at none."""
     share = scale.evidence.share([])
     return {name: _smallest(scale.evidence, name, share, scale.price(name) + entry_price(1)) for name in scale.names}
 
 
 def _smallest(evidence: Evidence, name: str, share: float, needed: float) -> float:
-    """Of the form that shows best."""
+    """The smallest size, um rms, at which the best visible form of a name has mean log odds `needed`; inf if none."""
     strengths = [evidence.strength(group, share) for group in evidence.forms[name]]
     enough = (
         size
@@ -388,17 +392,17 @@ def _smallest(evidence: Evidence, name: str, share: float, needed: float) -> flo
 
 
 def mean_odds(shown: Array) -> float:
-    """The log odds that an effect has on average, by the variances (k,) that it shows over those of noise: s^2 d."""
+    """Mean log odds of an effect with squared signal-to-noise ratios `shown` (k,), s^2 d of its independent parts."""
     return 0.5 * float((shown - np.log1p(shown)).sum())
 
 
 def shows_hardly_anything(findable: Mapping[str, float], sizes: Sequence[float]) -> bool:
-    """Whether few of the names that the poses can show would be found. A laser shows one error, but that one well."""
+    """Whether few of the visible names would be found. (A laser sees one error, but finds it.)"""
     return sum(size <= sizes[-1] for size in findable.values()) < FEW_SHOWN * max(len(findable), 1)
 
 
 def findable_in_words(findable: Mapping[str, float], count: int, sizes: Sequence[float]) -> str:
-    """How many of so many names would have been found, at which size."""
+    """A sentence that tells how many of `count` names would have been found at each of the sizes, um rms."""
     found = [(size, sum(own <= size for own in findable.values())) for size in sizes]
     steps = [(size, number) for k, (size, number) in enumerate(found) if number > (found[k - 1][1] if k else 0)]
     if not steps:

@@ -53,7 +53,7 @@ TYPED = 5.0
 """Log odds beforehand for a mistake that the file itself looks like."""
 TINY_UM = 1e-6
 TORN = "the machine file is wrong, or the readings are: no file is written until it is known which"
-ALIKE = 3.0
+ALIAS_LOG_ODDS = 3.0
 """Log odds (20 to 1) within which another mistake explains the data as well."""
 FIRST_SIGHT = 5.0
 """Mistakes that are less likely by so much, to first order, are not looked at again."""
@@ -72,7 +72,7 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     found = _simplest(alike, [each for each in tried if each.replaces and each.after_um < AS_SIMPLE * best.after_um])
     if found.odds <= 0:
         return None
-    near = [each for each in alike if each.odds > found.odds - ALIKE and each is not found]
+    near = [each for each in alike if each.odds > found.odds - ALIAS_LOG_ODDS and each is not found]
     torn = len({each.machine == machine for each in (found, *near)}) > 1
     components = len(now.problem.values) / max(sum(map(len, measurements)), 1)
     return replace(

@@ -12,7 +12,7 @@ from ncfix.arrays import Mask
 from ncfix.diagnosis.checks import sensible
 from ncfix.diagnosis.mistakes.mistake import Mistake, times
 from ncfix.diagnosis.residual_data import misfit
-from ncfix.diagnosis.selection import ALIKE
+from ncfix.diagnosis.selection import ALIAS_LOG_ODDS
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.plausible import times_a_machining_centre
@@ -54,7 +54,7 @@ def in_usual_unit(measurements: Sequence[Measurement], machine: Machine, refused
     except UsageError as refusal:
         told = all(each.kind == "axis" for each in measurements)  # what poses show may be that of another machine
         found = _usual_units(tuple(measurements), machine) if told and UNIT_OF_VALUES not in refused else []
-        found = [each for each in found if each.odds > found[0].odds - ALIKE]
+        found = [each for each in found if each.odds > found[0].odds - ALIAS_LOG_ODDS]
         if not found:
             raise
         if len(found) > 1:
