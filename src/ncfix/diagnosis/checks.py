@@ -1,4 +1,4 @@
-"""Data that cannot carry a diagnosis: said in plain words, and no name is given."""
+"""Checks that refuse data which do not support a diagnosis, and remarks on doubtful data."""
 
 from __future__ import annotations
 
@@ -19,39 +19,40 @@ from ncfix.measure.measurement import Measurement
 from ncfix.measure.selection import Selection
 
 SPARE = 12
-"""Values that must be left beside what is free."""
+"""Smallest number of values beyond the number of free parameters."""
 NEIGHBOURS = 60
-"""Rows from which on neighbouring poses tell the noise."""
+"""Number of rows from which the noise can be estimated from neighbouring poses."""
 STRANGE = 3e3
-"""Residuals, rms um, that no machine has, per mm of what is much of where an axis lies (an arm errs more)."""
+"""Implausible residual, um rms per mm of a large location error of this machine (`plausible.much`)."""
 MOST_VALUES = 1800
-"""Values that are weighed together: work grows with their third power, memory with the second."""
+"""Largest number of values of a diagnosis: work grows with their third power, memory with the second."""
 STAYED = "`ncfix plan` proposes poses; a test of drift needs a column time_s or temperatures"
 CONTRADICTION = 1e-6
+"""Probability by chance below which files contradict each other."""
 MISSTATED = 2.0
-"""Times by which repeats may scatter more or less than the noise that is stated."""
+"""Largest ratio, either way, of the scatter of repeats to the stated noise."""
 STEADY_UM = 0.05
-"""Standard deviation of repeats below which lengths are in another unit. Of the best machining centres it is 0.1 um (a
-unidirectional repeatability of ISO 230-2, four of them, of 0.4 um), and in inches it reads 25 times less than it is. So
-of machines that come back within 0.15 to 2 um, evenly in the logarithm, eight of ten are caught, and none that is
-right; of readings in metres all are."""
+"""Standard deviation of repeats, um, below which lengths are probably in another unit. The best machining centres have
+0.1 um (unidirectional repeatability of ISO 230-2, four sigma, of 0.4 um); values in inches read 25 times too small. Of
+machines with 0.15 to 2 um, evenly in the logarithm, this catches eight of ten files in inches, all in metres, and none
+in mm."""
 
 
 def bounded(measurements: Sequence[Measurement]) -> list[Measurement]:
-    """No more rows than can be weighed together: of the largest files some drawn at random, repeats together (NCF660).
+    """The measurements with at most `MOST_VALUES` values: a random sample of the largest files (NCF660).
 
-    Small files stay whole beside large ones. Evenly spaced rows might be all of one direction.
+    Small files stay whole, and repeats of a pose stay together. Evenly spaced rows might all be of one direction.
     """
-    left, most = MOST_VALUES, {}
+    remaining, allowed = MOST_VALUES, {}
     sizes = [len(each) * len(each.measured) for each in measurements]
-    for done, k in enumerate(sorted(range(len(sizes)), key=lambda k: sizes[k])):
-        most[k] = min(sizes[k], left // (len(sizes) - done))
-        left -= most[k]
-    return [_drawn(each, most[k]) if most[k] < sizes[k] else each for k, each in enumerate(measurements)]
+    for number, k in enumerate(sorted(range(len(sizes)), key=lambda k: sizes[k])):
+        allowed[k] = min(sizes[k], remaining // (len(sizes) - number))
+        remaining -= allowed[k]
+    return [_drawn(each, allowed[k]) if allowed[k] < sizes[k] else each for k, each in enumerate(measurements)]
 
 
 def _drawn(measurement: Measurement, most: int) -> Measurement:
-    """About so many values of it."""
+    """A random sample of about `most` values of a measurement, repeats together, with remark NCF660."""
     state = np.asarray(states([measurement]))
     counts = np.bincount(state) * len(measurement.measured)
     order = np.random.default_rng(0).permutation(len(counts))
@@ -63,7 +64,7 @@ def _drawn(measurement: Measurement, most: int) -> Measurement:
 
 
 def before(measurements: Sequence[Measurement], machine: Machine) -> None:
-    """Refuse what can be told without computing: one pose, no noise. Raises `UsageError` NCF651, NCF652."""
+    """Refuse data of a single pose or of unknown noise, before any fit. Raises `UsageError` NCF651, NCF652."""
     q = np.concatenate([each.positions(machine) for each in measurements])
     direct = any(each.kind in ("axis", "length") for each in measurements)
     if not direct and not any(each.stays for each in measurements) and float(np.ptp(q, axis=0).max(initial=0.0)) < 1e-3:
@@ -79,7 +80,7 @@ def _nothing(machine: Machine) -> Selection:
 
 
 def sensible(measurements: Sequence[Measurement], machine: Machine) -> None:
-    """Refuse what no mistake explains. Raises `UsageError` NCF654."""
+    """Refuse residuals too large for any machine of this kind. Raises `UsageError` NCF654."""
     now = misfit(measurements, machine)
     free = now.free
     if free > STRANGE * max(much(machine, f"EX0{axis.name}") for axis in machine.axes):
@@ -96,7 +97,10 @@ def enough(data: ResidualData) -> None:
 
 
 def agreeing(data: ResidualData, residual: Array, sigma: float) -> None:
-    """Refuse files that differ where they measured the same. Raises `UsageError` NCF656."""
+    """Refuse files that contradict each other at common poses. Raises `UsageError` NCF656.
+
+    residual  (m,) um; sigma: noise of a usual value, um
+    """
     if len(data.measurements) < 2:
         return
     apart, pairs = 0.0, 0
@@ -121,7 +125,7 @@ def agreeing(data: ResidualData, residual: Array, sigma: float) -> None:
 
 
 def _misstated(data: ResidualData) -> list[Message]:
-    """A noise that the files state and that repeats deny."""
+    """Remark NCF659 if the scatter of repeats contradicts the stated noise."""
     squares, freedom = repeat_scatter(data, data.row >= 0)
     if freedom < ENOUGH_REPEATS or not data.noise_stated:
         return []
@@ -132,7 +136,7 @@ def _misstated(data: ResidualData) -> list[Message]:
 
 
 def _steady(data: ResidualData) -> Iterator[Message]:
-    """Files of lengths whose repeats agree as those of no machine do."""
+    """Remarks NCF616 on files of lengths whose repeats agree better than any machine can."""
     for each in data.problem.observations:
         seen = float(np.median(each.um * each.sigma))
         if each.noise_known and not (each.noise_stated or each.turns.any()) and 0 < seen < STEADY_UM:
@@ -141,7 +145,7 @@ def _steady(data: ResidualData) -> Iterator[Message]:
 
 
 def remarks(data: ResidualData, unheard_of: Sequence[str]) -> list[Message]:
-    """What the user should know: directions that never change or are not said, names that do not exist."""
+    """Remarks on the data: directions that never change or are not stated, doubtful noise, unknown names."""
     found = []
     for axis in data.machine.axes:
         if silent := data.unstated(axis):

@@ -1,4 +1,4 @@
-"""From measurements and a machine to a verdict: what a diagnosis says, in one of four words, and all a report needs."""
+"""The diagnosis: from measurements and a machine file to a verdict and the findings of a report."""
 
 from __future__ import annotations
 
@@ -15,14 +15,7 @@ from ncfix.diagnosis.catalogue.dynamic import with_motion
 from ncfix.diagnosis.compound import EffectFinding, compound
 from ncfix.diagnosis.constants import ConstantsVerdict, FileLikelihood, MovedConstant, judged_constants, names_of
 from ncfix.diagnosis.evidence import SHARES, Comparison, Evidence, Member, entry_price
-from ncfix.diagnosis.forms import (
-    CHANGE,
-    changes,
-    file_constants,
-    scaled_axes,
-    unnamed_alternatives,
-    visible_forms,
-)
+from ncfix.diagnosis.forms import CHANGE, changes, file_constants, scaled_axes, unnamed_alternatives, visible_forms
 from ncfix.diagnosis.joint_fit import (
     RATHER,
     Gap,
@@ -70,28 +63,30 @@ from ncfix.values import frozen
 
 NOTHING, FOUND, AMBIGUOUS, UNKNOWN = "nothing-missing", "found", "ambiguous", "unknown-effect"
 EXCESS_UM = 2.0
-"""What has no name decides nothing below this, rms: machining centres have a little of everything."""
+"""An unnamed remainder below this, um rms, does not affect the verdict: every machine has small effects."""
 MUCH = 1 / 3
-"""Nor below this share of what all names together show."""
+"""Nor does one below this share of the size of all names together."""
 LACKING = 1e-3
-"""Probability of what is left by chance, below which something is missing that follows no pattern either."""
+"""Probability of the residual by chance below which something is missing."""
 AS_GOOD = 1.5
-"""A file that is refused as it stands is put right by a mistake that leaves no more than this times the noise."""
+"""Data that are refused with the given file are accepted if undoing a mistake leaves at most this times the noise."""
 CONSTANT_FAMILY = "constant of the file"
 PLAUSIBLE_UM = 4.0
-"""More of everything together no machine has that cuts parts, rms: a clear pattern is not taken for a little of all."""
+"""Largest plausible background of small effects, um rms; a larger one is a pattern that was taken for background."""
 CLEAR = float(np.log(1e6))
-"""Log odds of what has no name from which on it is no play of the noise, whatever the noise is."""
+"""Log odds of the unnamed alternatives from which on they are not noise, however poorly the noise is known."""
 NO_PATTERN = "something that follows no pattern that was looked for"
 
 
 @frozen(repr=False, slots=False)
 class Case:
-    """What was asked.
+    """The input of a diagnosis.
 
-    considered  how many names; `unheard_of` those that were refused and do not exist
-    invisible   names that the data cannot show, with the share that is left of them
-    outlying    (rows,) what was put aside
+    data        the residuals
+    considered  number of candidates
+    unheard_of  names to be left out that the catalogue does not have
+    invisible   (name, visible share of its squares) of candidates that the data cannot show
+    outlying    (rows,) mask of the outliers
     """
 
     data: ResidualData
@@ -102,25 +97,27 @@ class Case:
 
     @property
     def kept(self) -> Mask:
-        """(m,) values of rows that were not put aside."""
+        """(m,) mask of the values of rows that are no outliers."""
         return ~self.outlying[np.maximum(self.data.row, 0)] & (self.data.row >= 0)
 
 
 @frozen(repr=False, eq=False, slots=False)
 class Diagnosis:
-    """What was found, and everything a report needs.
+    """The result of a diagnosis.
 
     verdict        nothing-missing, found, ambiguous, unknown-effect
     findings       likeliest first
-    rest           what has no name
-    machine        with the findings added, or None if there is nothing to add
-    before, after  (m,) residuals with the constants alone and with the findings, um; p_lack, p_left by chance
-    likelihood     log likelihood of the values about the file with all that was found, less its prices
+    rest           the remainder without a name
+    gap, floor     residuals in um rms, and the noise
+    machine        the machine with the findings added, or None if there is nothing to add
+    before, after  (m,) residuals with the constants alone, and with the findings, um
+    p_lack, p_left  probability of so large residuals by chance, before and after; None if the noise is not known
+    likelihood     log likelihood of the values given the file with all findings, less their prices
     named_odds     log odds of all names together
-    steady         of two dates: names of what was there before, and is
-    clustering     how much neighbouring residuals are alike, before and after
-    constants      what the data say of the constants of the machine file; the gap before is after that
-    findable       name -> um rms from which on an effect would be found in these data; inf: never
+    steady         names of effects that two dates have in common; `dates`: changes between dates were sought
+    clustering     Moran's I of the residuals, before and after
+    constants      the verdict on the constants of the machine file; `gap.before` has them corrected
+    findable       name -> size, um rms, from which an effect would be found in these data; inf: never
     """
 
     case: Case
@@ -147,36 +144,36 @@ class Diagnosis:
 
     @property
     def data(self) -> ResidualData:
-        """The data."""
+        """The residuals."""
         return self.case.data
 
     @property
     def messages(self) -> tuple[Message, ...]:
-        """What there is to say of the data, and of names to be left out that do not exist."""
+        """Remarks on the data, and on unknown names to be left out."""
         return tuple(checks.remarks(self.data, self.case.unheard_of))
 
     @property
     def moved(self) -> tuple[MovedConstant, ...]:
-        """Constants of the machine file that the data put elsewhere."""
+        """Constants of the machine file that the data contradict."""
         return self.constants.moved
 
     @property
     def unknown_um(self) -> float:
-        """rms of what has no name."""
+        """Size of the unnamed remainder, um rms."""
         return self.rest.size_um
 
     @property
     def p_left(self) -> float | None:
-        """Probability of the residuals after by chance; None where the noise is not known."""
+        """Probability by chance of the residuals with the findings; None if the noise is not known."""
         return self.rest.p_left
 
 
 @frozen
 class Unexplained:
-    """What the names leave.
+    """The remainder that the names do not explain.
 
-    pattern_um  of it what rivals without a name explain, rms, `titles` what those are, `odds` their log odds
-    beyond_um   of it what is beyond the noise, and `p_left` how likely that is by chance, None where it is not known
+    pattern_um  part that unnamed alternatives explain, um rms; titles: of those, odds: their log odds
+    beyond_um   part of the residual beyond the noise, um rms; p_left: its probability by chance, None if unknown
     """
 
     pattern_um: float
@@ -187,17 +184,17 @@ class Unexplained:
 
     @property
     def lacking(self) -> bool:
-        """Whether so much is left beyond the noise only by a rare chance."""
+        """Whether the residual is significantly larger than the noise."""
         return self.p_left is not None and self.p_left < LACKING
 
     @property
     def size_um(self) -> float:
-        """How much has no name, rms."""
+        """Size of the unnamed remainder, um rms."""
         return max(self.pattern_um, self.beyond_um) if self.lacking else self.pattern_um
 
     @property
     def kind(self) -> str:
-        """What it depends on."""
+        """Inputs on which the remainder depends, in words."""
         return " and ".join(self.titles) or (NO_PATTERN if self.size_um else "")
 
 
@@ -205,9 +202,11 @@ def verdict_of(
     findings: Sequence[EffectFinding], rest: Unexplained, told_um: float, floor: NoiseFloor, noise_um: float,
     little: float = 1.0,
 ) -> str:  # fmt: skip
-    """The verdict, where the names show `told_um`.
+    """The verdict.
 
-    Without repeats a smooth rest may as well be the part's or the instrument's: only a large or clear one decides.
+    told_um   size of all findings together, um rms; noise_um: of the noise
+    little    factor on the sizes that are too small to matter (`residual_data.little_of`)
+    Without repeats a smooth remainder may come from the part or the instrument: only a large or clear one counts.
     """
     doubtful = floor.source == "neighbours"
     excess = EXCESS_UM * little
@@ -220,9 +219,9 @@ def verdict_of(
 
 
 def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
-    """All that is said of a case in which these effects were selected.
+    """The diagnosis of a case, given the selected effects.
 
-    Names are fitted without what has none: that shall explain only what they leave (Plumlee 2017).
+    Names are fitted without the unnamed alternatives, which shall explain only the remainder (Plumlee 2017).
     """
     evidence, data, keep = scale.evidence, case.data, case.kept
     every, told = list(selected.members.values()), [selected.members[name] for name in selected.named]
@@ -272,7 +271,7 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
 def _findings(
     case: Case, evidence: Evidence, selected: Selected, joint: JointFit, added: Sequence[tuple[Effect, ...]]
 ) -> tuple[EffectFinding, ...]:
-    """The names with what they show and add."""
+    """A finding for each named member, with its effect on the values and the effects that it adds."""
     found = []
     for name, effects, shown in zip(selected.named, added, joint.shown, strict=True):
         owner = evidence.groups[selected.members[name].group].owner
@@ -285,16 +284,16 @@ def _findings(
 
 
 def _likelihood(scale: Comparison, selected: Selected, constants: ConstantsVerdict, share: float) -> float:
-    """Of the values about the file with constants, names and alternatives, less what they pay."""
+    """Log likelihood of the values with corrected constants, names and alternatives, less their prices."""
     asked = FileLikelihood(scale.evidence, scale.all(selected.members), share)
     paid = sum(map(scale.price, selected.members)) + entry_price(len(selected.members)) + constants.paid
     return asked.likelihood(np.flatnonzero(~constants.stay).tolist()) - paid
 
 
 def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: float) -> tuple[EffectFinding, ...]:
-    """Constants of the file that are off by more than a day and a set-up make of them: findings like names.
+    """Findings for constants of the file that are off by more than day and set-up explain.
 
-    Beside a name they have to matter at least half as much: the mean of a curve is a constant, too.
+    named_um  size of the largest name, um rms; constants smaller than `RATHER` times that may be part of it
     """
     if constants.odds <= 0 or constants.size_um < max(EXCESS_UM * case.data.little, RATHER * named_um):
         return ()
@@ -322,7 +321,7 @@ def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: fl
 
 
 def _owners(data: ResidualData, machine: Machine) -> list[Effect]:
-    """The effect of each free constant, as the new machine has it."""
+    """For each free constant, its effect in the new machine."""
     free = [effect for effect, loose in zip(machine.effects, data.problem.selection.free, strict=False) if loose]
     return [replace(effect, covariance=None) for effect in free for _ in range(effect.basis.size)]
 
@@ -330,7 +329,7 @@ def _owners(data: ResidualData, machine: Machine) -> list[Effect]:
 def _rest(
     case: Case, evidence: Evidence, selected: Selected, joint: JointFit, floor: NoiseFloor, noise: Array, odds: float
 ) -> Unexplained:
-    """What has no name."""
+    """The remainder without a name."""
     keep = case.kept
     every = list(selected.members.values())
     whole = fitted(evidence, every, evidence.share(every))
@@ -358,22 +357,23 @@ def _gap(case: Case, evidence: Evidence, told: Sequence[Member], joint: JointFit
 
 
 def _constants(case: Case) -> float:
-    """How many numbers are free anyway."""
+    """Number of independent free parameters of set-up and constants."""
     return float(np.linalg.matrix_rank(case.data.base))
 
 
 def _sigma(evidence: Evidence, members: Sequence[Member], share: float) -> float:
-    """Noise of one value, um, with the members there."""
+    """Noise of a usual value, um, estimated with the members fitted."""
     return evidence.background.sigma * float(np.sqrt(evidence.noise(members, share)))
 
 
 def diagnose(
     measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str] = (), since: bool = False
 ) -> Diagnosis:
-    """Compare, name, add, and show how far the gap shrank. `refused` are names that must not be used.
+    """Diagnose a machine file by measurements: find missing effects, wrong constants and mistakes.
 
-    since  the last file is of a later date than those before: only what changed is a finding
-    Raises `UsageError` NCF630, NCF637 and NCF650 ... NCF659 where the data cannot carry a diagnosis.
+    refused  names that must not be used
+    since    the last file is of a later date than the others: only changes between the dates are findings
+    Raises `UsageError` NCF630, NCF637 and NCF650 ... NCF659 if the data do not support a diagnosis.
     """
     checks.before(measurements, machine)
     measurements = checks.bounded([with_motion(each, machine) for each in measurements])
@@ -405,7 +405,7 @@ def diagnose(
 
 
 def _changes(found: Diagnosis, evidence: Evidence) -> Diagnosis:
-    """Of a diagnosis of two dates: what came between them is found, what was there before is steady."""
+    """The diagnosis of two dates: findings are the changes between them; the other names are listed as steady."""
     new = tuple(each for each in found.findings if each.candidate.name.startswith(CHANGE))
     steady = tuple(each.candidate.name for each in found.findings if each not in new)
     members = found.selected.members
@@ -425,15 +425,16 @@ def _changes(found: Diagnosis, evidence: Evidence) -> Diagnosis:
 
 
 def _visible_size(data: ResidualData, shown: Sequence[Array]) -> float:
-    """The size of what several effects show together beside what is free, um."""
+    """Size of several effects together, um rms, beside set-up and constants."""
     return data.size(visible(data, np.sum([np.zeros(len(data.y)), *shown], axis=0)))
 
 
 def _explained(
     measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str], since: int = 0
 ) -> Diagnosis:
-    """Constants and names, whatever mistakes there may be; with what may have changed from file number `since` on.
+    """The diagnosis of constants and names, without a search for mistakes.
 
+    since  index of the first file of the later date; 0: all are of one date
     Raises `UsageError` NCF650, NCF656.
     """
     case, scale = weighed(measurements, machine, refused, since)
@@ -450,7 +451,7 @@ def _explained(
 def weighed(
     measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str] = (), since: int = 0
 ) -> tuple[Case, Comparison]:
-    """What is asked, and the scale on which sets of effects are compared. Raises `UsageError` NCF650."""
+    """The case, and the comparison of sets of effects for it. Raises `UsageError` NCF650."""
     seen = residual_data(measurements, machine)
     checks.enough(seen)
     candidates, unheard_of = without(catalogue(seen.measured), refused)
@@ -468,21 +469,21 @@ def weighed(
 
 
 def _everything_um(evidence: Evidence, selected: Selected) -> float:
-    """How much of everything together the background has beside what was selected, um rms."""
+    """Size of the background of small effects beside the selected ones, um rms."""
     every = list(selected.members.values())
     share = evidence.share(every)
     return share * _sigma(evidence, every, share)
 
 
 def _selected(scale: Comparison) -> Selected:
-    """What is there: curves and the like while lacking constants are free, then those, then what holds."""
+    """The selected effects: first with lacking constants free, then with those selected, then those that predict."""
     freed = with_constants_free(scale.evidence)
     members = select(freed, (*freed.names, *freed.evidence.alternatives))
     return passing(scale, plainest(scale, with_alternatives(scale, with_constants(scale, members))))
 
 
 def _with_mistake(diagnosis: Diagnosis, wrong: Mistake, given: Machine) -> Diagnosis:
-    """The diagnosis with the mistake as its first finding; the machine file that was given is put right."""
+    """The diagnosis with the mistake as its first finding, and with the given machine file corrected for it."""
     remedy = wrong.remedy or "correct the mistake"
     candidate = Candidate(wrong.name, wrong.title, wrong.axis, "mistake", (), (), remedy=remedy)
     size = float(np.sqrt(max(wrong.given_um**2 - diagnosis.gap.given**2, 0.0)))

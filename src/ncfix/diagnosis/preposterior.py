@@ -59,7 +59,7 @@ class PredictedValues:
 
 
 def shown_at(new: Observation, groups: Sequence[EffectForm]) -> list[Array]:
-    """Effect of the numbers of each form at further poses, (v, p) um; zero for forms that are no error of the machine."""
+    """Effect of the numbers of each form at further poses, (v, p) um; zero for forms that no machine file holds."""
     owners = {group.owner.name: group.owner for group in groups if not group.owner.kept_out}
     design = new.um[:, None] * new.design([effect for owner in owners.values() for effect in owner.effects])
     ends = np.cumsum([sum(effect.basis.size for effect in owner.effects) for owner in owners.values()])

@@ -1,7 +1,4 @@
-"""A diagnosis in words.
-
-A diagnosis as a JSON object, and its machine with provenance.
-"""
+"""A diagnosis as a text report and as a JSON object, and its machine with provenance."""
 
 from __future__ import annotations
 
@@ -22,13 +19,13 @@ from ncfix.machine import Machine
 from ncfix.measure.calibrate import untold
 
 HEAD = ("rung", "left, um", "held out", "share", "log odds", "found")
-"""Of the table of the ladder."""
+"""Headings of the table of the ladder."""
 LEAST_P = 1e-300
-"""Smaller probabilities are not told from zero."""
+"""Smallest probability that is printed."""
 SHOWN = 0.05
-"""um and urad: what is smaller is not there."""
+"""Smallest error that is printed, um or urad."""
 NEARLY = 0.925
-"""Chances above this are said to be nearly sure, in steps of five of a hundred."""
+"""Chances above this are called nearly sure; others are rounded to five in a hundred."""
 SAID = {
     NOTHING: "nothing is missing that stands out of the noise",
     FOUND: "the model lacks something that has a name",
@@ -42,13 +39,13 @@ CHANGED = {
     AMBIGUOUS: "something changed, and these data leave more than one name for it",
     UNKNOWN: "something changed that is not in the catalogue",
 }
-"""Of two dates."""
+"""Verdicts of a comparison of two dates."""
 NOISE = {
     "repeats": "from repeats",
     "given": "as the files state it",
     "neighbours": "estimated from neighbouring poses",
 }
-"""Where it comes from."""
+"""Source of the noise, in words."""
 
 
 def text(diagnosis: Diagnosis) -> str:
@@ -103,7 +100,7 @@ def _table(diagnosis: Diagnosis) -> list[str]:
 
 
 def verdict(diagnosis: Diagnosis) -> str:
-    """What the verdict means."""
+    """The verdict as a sentence."""
     if diagnosis.dates:
         return CHANGED[diagnosis.verdict]
     if diagnosis.verdict == NOTHING and diagnosis.rest.lacking:
@@ -118,7 +115,7 @@ def verdict(diagnosis: Diagnosis) -> str:
 
 
 def noise(diagnosis: Diagnosis) -> list[str]:
-    """Why what is left counts as noise, though it is not quite the noise of the instrument."""
+    """A line that the residual counts as noise, if it does."""
     p = diagnosis.p_left
     return (
         []
@@ -128,13 +125,13 @@ def noise(diagnosis: Diagnosis) -> list[str]:
 
 
 def held(diagnosis: Diagnosis) -> list[str]:
-    """What the data cannot tell of the constants, as `calibrate` says it."""
+    """Remarks on constants that the data cannot determine, as in `calibrate`."""
     labels = names_of(diagnosis.data.problem.selection)
     return [message.text for message in untold(diagnosis.constants.solution, labels)]
 
 
 def silence(diagnosis: Diagnosis) -> list[str]:
-    """What it means that nothing was found."""
+    """What a result without findings means: the sizes from which effects would have been found."""
     count = diagnosis.case.considered
     few = shows_hardly_anything(diagnosis.findable, diagnosis.data.sizes)
     return [
@@ -144,14 +141,14 @@ def silence(diagnosis: Diagnosis) -> list[str]:
 
 
 def constant(moved: MovedConstant) -> str:
-    """A constant of the file, and what the data say."""
+    """A constant of the file with its value by the data."""
     factor, unit = moved.unit
     file, data, sigma = (factor * value for value in (moved.file, moved.data, moved.sigma))
     return f"{moved.name}: {file:.4g} in the file, {data:.4g} +- {sigma:.2g} {unit} by the data"
 
 
 def constants(finding: EffectFinding) -> str:
-    """The largest error of the joint beside what machines have."""
+    """The largest error motion of the joint, with the plausible limit."""
     judged = finding.judgement
     if judged is None:
         return ""
@@ -165,7 +162,7 @@ def constants(finding: EffectFinding) -> str:
 
 
 def odd(finding: EffectFinding) -> str:
-    """What is odd about the constants."""
+    """Remarks on implausible coefficients; empty if there are none."""
     return (
         f"hardly plausible: {'; '.join(finding.judgement.remarks)}"
         if finding.judgement and finding.judgement.remarks
@@ -174,7 +171,7 @@ def odd(finding: EffectFinding) -> str:
 
 
 def carried(diagnosis: Diagnosis, finding: EffectFinding) -> str:
-    """Which targets can carry the effect."""
+    """The targets that can correct the effect; empty if there are none."""
     machine = diagnosis.data.machine
     named = ", ".join(carriers(machine, finding.effects))
     given = ", ".join(conditions(machine, finding.effects))
@@ -182,7 +179,7 @@ def carried(diagnosis: Diagnosis, finding: EffectFinding) -> str:
 
 
 def rest(diagnosis: Diagnosis) -> str:
-    """What has no name; and that it decides nothing, where it does not."""
+    """The unnamed remainder, and why it does not affect the verdict if it does not."""
     said = f"without a name: {diagnosis.unknown_um:.1f} um rms of {diagnosis.rest.kind}"
     if diagnosis.verdict == UNKNOWN:
         return said
@@ -191,7 +188,7 @@ def rest(diagnosis: Diagnosis) -> str:
 
 
 def _next(diagnosis: Diagnosis) -> list[str]:
-    """What to measure next, or that nothing of this kind would help."""
+    """What to measure next, or that no measurement of this kind would help."""
     p = diagnosis.proposal
     if p is None:
         return []
@@ -208,7 +205,7 @@ def _next(diagnosis: Diagnosis) -> list[str]:
 
 
 def hope(proposal: Proposal) -> str:
-    """How far the poses would lead."""
+    """The chance that the proposed poses leave one name."""
     assert proposal.plan is not None
     said = f"{len(proposal.plan)} more poses leave one name in {_of_hundred(proposal.chance)}"
     if proposal.stuck:
@@ -223,7 +220,7 @@ def _of_hundred(chance: float) -> str:
 
 
 def unusual(proposal: Proposal) -> str:
-    """What has to be done that was not done so far."""
+    """Travels and tools that the proposed poses need beyond those used so far."""
     far = [*proposal.beyond, *(["the tool tip"] if proposal.strays else [])]
     said = [f"{', '.join(far)} beyond the travels measured so far"] if far else []
     if proposal.tools:
@@ -233,12 +230,12 @@ def unusual(proposal: Proposal) -> str:
 
 
 def hopeless(proposal: Proposal) -> str:
-    """What no pose tells apart."""
+    """Rivals that no pose on offer tells apart."""
     return f"{', '.join(proposal.alike)}: no measurement of this kind would tell that apart" if proposal.alike else ""
 
 
 def why(diagnosis: Diagnosis, finding: EffectFinding) -> str:
-    """One sentence on why this name."""
+    """Why this name was found: size, log odds, and the next best name."""
     name = finding.candidate.name
     chance = f"p at most {max(finding.p_value, LEAST_P):.1g}"
     said = f"{finding.size_um:.1f} um rms, log odds {finding.odds:.0f} ({chance})"
@@ -250,7 +247,7 @@ def why(diagnosis: Diagnosis, finding: EffectFinding) -> str:
 
 
 def as_dict(diagnosis: Diagnosis, machine: str | None = None) -> dict[str, Any]:
-    """The fields of docs/formats.md and docs/diagnose.md."""
+    """The diagnosis as a JSON object; its fields are in docs/formats.md and docs/diagnose.md."""
     return {
         "verdict": diagnosis.verdict,
         "ladder": [
@@ -377,7 +374,7 @@ def _outliers(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def with_provenance(diagnosis: Diagnosis) -> Machine:
-    """The machine with where its new effects come from."""
+    """The new machine, with notes on the source of its new effects."""
     assert diagnosis.machine is not None
     notes = {
         "date": datetime.date.today(),
