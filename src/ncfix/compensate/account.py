@@ -1,9 +1,10 @@
 """The account of a correction: every motion block ends in exactly one of compensated, passed, refused.
 
-Besides, two things are counted that a block alone does not show. Motions that cut and have no figure: figures are of
-feeds, arcs and holes, and one that is not in them, because it passes by rule, is refused, or begins or ends where
-nobody knows, is counted by the reason, so that no figure speaks for what was not looked at. And what stays undone
-because an axis must get no word: by axis, with its lines.
+Two more things are counted.
+
+- Feeds, arcs and holes that the figures of the report leave out, by reason: passed by rule, refused, or with a start or
+  end that is not known. So no figure seems to cover a motion that was not examined.
+- Corrections that were not made because an axis must get no word, by axis, with their lines (NCF439).
 """
 
 from __future__ import annotations
@@ -27,18 +28,18 @@ LEFT = "an axis is left where it stands"
 UNKNOWN = "where it begins or ends is not known"
 MEASURED = "it leads to where the machine has measured itself"
 BY_RULE = "passed by rule"
-"""Of motions of which nobody says by which."""
+"""Reason of motions that pass by a rule without a name."""
 
 
 class NoFigureReason(NamedTuple):
-    """Why motions have no figure; `cuts`: they may cut, and not be right."""
+    """Why motions have no figure; `cuts`: they may cut, so that their error matters."""
 
     reason: str
     cuts: bool
 
 
 def rule_of(moves: Moves, row: int) -> NoFigureReason:
-    """The rule by which a motion passes."""
+    """The rule by which motion `row` passes."""
     rule = Pass.NONE if moves.passing is None else Pass(int(moves.passing[row]))
     return (
         NoFigureReason(BY_RULE, True)
@@ -48,59 +49,60 @@ def rule_of(moves: Moves, row: int) -> NoFigureReason:
 
 
 def at_feed(moves: Moves) -> Mask:
-    """(n,) feeds, arcs and holes, also those that pass."""
+    """(n,) whether a motion is a feed, an arc or a hole; motions that pass are included."""
     return (moves.kind != MotionKind.RAPID) & (moves.kind != MotionKind.DWELL)
 
 
 def at_measured_places(moves: Moves) -> Mask:
-    """(n,) motions of which a word is computed from what the machine has measured, with its error in it."""
+    """(n,) motions with a word that is computed from the machine's own measurement, and so contains its errors."""
     return np.zeros(len(moves), dtype=bool) if moves.measured is None else np.any(moves.measured, axis=1)
 
 
 def without_figure(moves: Moves, unchanged: Mask, left: Mask | None, own: Mask | None = None) -> Counter[str]:
-    """Motions without a figure before and after a correction, by reason, of those that are `own` (n,) if given.
+    """Number of feeds, arcs and holes that the figures before and after a correction leave out, by reason.
 
-    unchanged  (n,) left as they were
-    left  (n, n_axes) axes that were left where they stand, along which figures say nothing; None: none
+    unchanged  (n,) motions left as they were
+    left       (n, n_axes) axes that were left where they stand: the figures say nothing along them; None: none
+    own        (n,) the motions to count; None: all
     """
     fed = at_feed(moves) if own is None else at_feed(moves) & own
     beside = np.zeros(len(moves), dtype=bool) if left is None else left[:, ~moves.rotary].any(axis=1)
     passed, measured = moves.rule == Rule.PASS, at_measured_places(moves)
-    found = Counter(rule_of(moves, row).reason for row in np.flatnonzero(fed & passed).tolist())
-    found[REFUSED] += int(np.count_nonzero(fed & unchanged & ~passed))
-    found[MEASURED] += int(np.count_nonzero(fed & ~unchanged & ~passed & measured))
-    found[LEFT] += int(np.count_nonzero(fed & ~unchanged & ~passed & ~measured & beside))
-    return +found
+    counts = Counter(rule_of(moves, row).reason for row in np.flatnonzero(fed & passed).tolist())
+    counts[REFUSED] += int(np.count_nonzero(fed & unchanged & ~passed))
+    counts[MEASURED] += int(np.count_nonzero(fed & ~unchanged & ~passed & measured))
+    counts[LEFT] += int(np.count_nonzero(fed & ~unchanged & ~passed & ~measured & beside))
+    return +counts
 
 
 def not_looked_at(moves: Moves) -> dict[NoFigureReason, Index]:
-    """The feeds, arcs and holes that a look along the path leaves out."""
+    """The feeds, arcs and holes that are left out when a path is examined: reason -> rows of the motions."""
     ends, starts = (np.isfinite(places).all(axis=1) for places in (moves.end, moves.start))
     lost = np.where(moves.kind == MotionKind.CYCLE, ~ends, ~(ends & starts))
-    found: dict[NoFigureReason, list[int]] = {}
+    rows_of: dict[NoFigureReason, list[int]] = {}
     measured = at_measured_places(moves)
     for row in np.flatnonzero(at_feed(moves) & (lost | measured | (moves.rule == Rule.PASS))).tolist():
         if moves.rule[row] == Rule.PASS:
             why = rule_of(moves, row)
         else:
             why = NoFigureReason(UNKNOWN, True) if lost[row] else NoFigureReason(MEASURED, False)
-        found.setdefault(why, []).append(row)
-    return {why: np.array(rows, dtype=np.intp) for why, rows in found.items()}
+        rows_of.setdefault(why, []).append(row)
+    return {why: np.array(rows, dtype=np.intp) for why, rows in rows_of.items()}
 
 
-FEW = 4
-"""So many stretches of lines are named one by one."""
+MAX_STRETCHES = 4
+"""Largest number of stretches of lines that a message names one by one."""
 HINT = "name it in one of the first blocks, and again after a change of tool or offsets, or after machine coordinates"
 
 
 @frozen
 class LeftAxis:
-    """One axis that was left where it stands.
+    """One axis that got no word although a correction needed one, so that it was left where it stands.
 
-    motions    how many motions would have moved it
-    cuts       how many of these cut
-    stretches  their lines, from and to
-    most       how far it is from where it should be, at their ends and along cuts, at most, mm or rad
+    motions    number of motions in which it should have moved
+    cuts       number of these that cut
+    stretches  their lines, as (first, last) of each stretch
+    most       largest distance from where it should be, at the ends of these motions and along cuts, mm or rad
     """
 
     axis: str
@@ -112,22 +114,22 @@ class LeftAxis:
 
     @property
     def first(self) -> int:
-        """The first of these lines."""
+        """The first line in which the axis was left."""
         return self.stretches[0][0]
 
     @property
     def last(self) -> int:
-        """The last of them."""
+        """The last line in which the axis was left."""
         return self.stretches[-1][1]
 
     def with_later(self, other: LeftAxis) -> LeftAxis:
-        """This and what comes later in the program."""
+        """This entry and that of a later part of the program, as one."""
         motions, cuts = self.motions + other.motions, self.cuts + other.cuts
         stretches, most = merged(self.stretches, other.stretches), max(self.most, other.most)
         return LeftAxis(self.axis, self.rotary, motions, cuts, stretches, most)
 
     def message(self, path: str, *others: LeftAxis) -> Message:
-        """In words; `others`: axes that were left in the same motions."""
+        """Warning NCF439 for this axis and `others` that were left in the same motions."""
         if self.motions == 1:
             many = f"this motion, which {'cuts' if self.cuts else 'cuts nothing'}"
         else:
@@ -145,7 +147,7 @@ class LeftAxis:
         return Message("NCF439", text, Place(path, self.first), HINT if self.cuts else "")
 
     def _where(self) -> str:
-        if len(self.stretches) > FEW:
+        if len(self.stretches) > MAX_STRETCHES:
             return f"between lines {self.first} and {self.last}"
         return "lines " + ", ".join(str(a) if a == b else f"{a} to {b}" for a, b in self.stretches)
 
@@ -158,53 +160,57 @@ class LeftAxis:
 
 @frozen
 class Lacking:
-    """Which axes of motions were left, (n, n_axes), and how far they are from where they should be, mm or rad."""
+    """Axes left where they stand.
+
+    axes  (n, n_axes) whether an axis was left in a motion
+    off   (n, n_axes) distance of each axis from where it should be, mm or rad
+    """
 
     axes: Mask
     off: Array
 
 
 def left_where_they_stand(program: Program, moves: Moves, left: Lacking | None) -> dict[str, LeftAxis]:
-    """The axes that were left, by name."""
+    """The axes that were left where they stand, by name."""
     if left is None:
         return {}
-    found, lacking, off = {}, left.axes, left.off
+    by_name, lacking, off = {}, left.axes, left.off
     for column in np.flatnonzero(lacking.any(axis=0)).tolist():
         rows = np.flatnonzero(lacking[:, column])
         axis, turns, most = moves.axes[column], bool(moves.rotary[column]), float(off[rows, column].max())
         cuts, stretches = int(moves.cutting[rows].sum()), stretches_of(program, moves.block[rows])
-        found[axis] = LeftAxis(axis, turns, len(rows), cuts, stretches, most)
-    return in_order(found)
+        by_name[axis] = LeftAxis(axis, turns, len(rows), cuts, stretches, most)
+    return in_order(by_name)
 
 
 def stretches_of(program: Program, blocks: NDArray[np.int32]) -> tuple[tuple[int, int], ...]:
-    """The lines of blocks, as stretches without gaps, from and to."""
+    """The lines of blocks as (first, last) of each stretch without gaps."""
     lines = np.sort(program.lines(blocks))
     return in_stretches(lines[np.diff(lines, prepend=-1) != 0])
 
 
 def in_stretches(lines: Ints) -> tuple[tuple[int, int], ...]:
-    """Lines in ascending order, as stretches without gaps, from and to."""
+    """Lines in ascending order as (first, last) of each stretch without gaps."""
     begins = np.flatnonzero(np.diff(lines, prepend=-1) > 1)
     ends = np.append(begins[1:], len(lines)) - 1
     return tuple(zip(lines[begins].tolist(), lines[ends].tolist(), strict=True))
 
 
 def merged(before: tuple[tuple[int, int], ...], later: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
-    """Stretches of lines, and those that follow them."""
+    """Two lists of stretches of lines as one; `later` begins at or behind the last line of `before`."""
     if later[0][0] > before[-1][1] + 1:
         return (*before, *later)
     return (*before[:-1], (before[-1][0], later[0][1]), *later[1:])
 
 
 def joined(before: Mapping[str, LeftAxis], later: Mapping[str, LeftAxis]) -> dict[str, LeftAxis]:
-    """What was left in two parts of a program, one behind the other."""
+    """The axes that were left in two consecutive parts of a program."""
     both = {axis: before[axis].with_later(later[axis]) for axis in before.keys() & later.keys()}
     return in_order({**before, **later, **both})
 
 
 def either(found: Sequence[Mapping[str, LeftAxis]]) -> dict[str, LeftAxis]:
-    """What is left in any of several ways in which a program may run: the most of each axis."""
+    """The axes that are left in any position of block delete: the largest figures of each axis, and all its lines."""
     together = dict(found[0])
     for other in found[1:]:
         for axis, left in other.items():
@@ -221,7 +227,7 @@ def either(found: Sequence[Mapping[str, LeftAxis]]) -> dict[str, LeftAxis]:
 
 
 def said_of(left: Iterable[LeftAxis], path: str) -> list[Message]:
-    """What there is to say of axes that were left; of those left in the same motions once."""
+    """The messages about axes that were left: one for all axes that were left in the same motions."""
     alike: dict[object, list[LeftAxis]] = {}
     for each in left:
         alike.setdefault((each.rotary, each.motions, each.cuts, each.stretches), []).append(each)
@@ -229,7 +235,7 @@ def said_of(left: Iterable[LeftAxis], path: str) -> list[Message]:
 
 
 def in_order(found: Mapping[str, LeftAxis]) -> dict[str, LeftAxis]:
-    """The axes, those that are left in the earliest lines first."""
+    """The axes, ordered by the first line in which each is left."""
     return dict(sorted(found.items(), key=lambda item: (item[1].first, item[0])))
 
 
@@ -244,11 +250,11 @@ class Reason:
 
 @frozen
 class Account:
-    """Motion blocks by what became of them; every one is in exactly one of the three.
+    """The motion blocks of a program; each is in exactly one of `compensated`, `passed` and `refused`.
 
     passed   block -> why it was passed, in the words of its program
-    refused  block -> why
-    rules    block that was passed -> the rule (`Pass`) by which
+    refused  block -> why it was refused
+    rules    passed block -> name of the rule (`Pass`) by which it was passed
     """
 
     compensated: frozenset[int]
@@ -258,7 +264,7 @@ class Account:
 
     @classmethod
     def of(cls, moves: Moves, unchanged: Mask, reasons: Mapping[int, Reason]) -> Account:
-        """Account for the motions. A block with several motions is refused if any of them is, else passed if any is."""
+        """The account of these motions. A block is refused if any of its motions is, else passed if any is."""
         motion = moves.kind != MotionKind.DWELL
         by_rule = np.flatnonzero(motion & (moves.rule == Rule.PASS))
         refused = {block: reasons[block] for block in moves.block[motion & unchanged].tolist() if block in reasons}
@@ -273,7 +279,7 @@ class Account:
 
     @classmethod
     def together(cls, accounts: Sequence[Account]) -> Account:
-        """One account of blocks that are executed in several ways: refused if in any, else passed if in any."""
+        """One account for all positions of block delete: a block is refused if it is in any, else passed if in any."""
         if len(accounts) == 1:
             return accounts[0]
         refused = {block: why for each in reversed(accounts) for block, why in each.refused.items()}
@@ -285,9 +291,9 @@ class Account:
 
     @property
     def total(self) -> int:
-        """Motion blocks in all."""
+        """Number of motion blocks."""
         return len(self.compensated) + len(self.passed) + len(self.refused)
 
     def reasons(self) -> Counter[str]:
-        """How often each reason of refusal occurs, in blocks."""
+        """Number of refused blocks for each reason."""
         return Counter(reason.text for reason in self.refused.values())

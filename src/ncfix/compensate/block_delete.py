@@ -1,9 +1,9 @@
-"""Block delete: a program with blocks that the operator may have skipped (`/`, `/2`), right in all positions.
+"""Block delete: correct a program with skippable blocks (`/`, `/2`) so that it is right in all switch positions.
 
-Each switch may be on or off while the program runs, and the text is the same. So the program is followed in every
-position of its switches, and corrected in each of them for itself; where a block is executed in several positions, all
-of them must want the same of it. A motion that does not start at the same place in all of them is not split, for the
-pieces would lie on one of its ways only; what still needs another correction in another position is refused.
+The operator may set each switch on or off, but there is only one text. So the program is followed and corrected
+separately in every position of its switches. All positions that execute a block must agree on its new text. A motion
+that starts at different places in different positions is not split, because the pieces would lie on one of its paths
+only. A block that still needs different corrections in different positions is refused.
 """
 
 from __future__ import annotations
@@ -45,11 +45,12 @@ DIFFERS = "NCF451"
 TOO_MANY = "NCF452"
 NOT_IN_ALL = "NCF453"
 MOST_SWITCHES = 4
-"""Switches of which all positions are followed: sixteen of them."""
+"""Largest number of switches whose positions are all followed (sixteen positions)."""
 ATTEMPTS = 16
-"""The second attempt knows the frames that moved with the first, each further one a frame that depends on others."""
-GRAIN = 9
-"""Decimals of mm and rad to which places are the same."""
+"""Largest number of attempts. The second knows the frames that the first has moved, each further one those that depend
+on them."""
+POSITION_DECIMALS = 9
+"""Decimals, of mm and rad, to which two positions must agree to count as the same."""
 WHY = "where a block with / before it is skipped, this block needs another correction than where that is executed"
 
 Follow = Callable[[Setup], Trace]
@@ -59,9 +60,10 @@ Readings = Sequence[SecondReading | None]
 
 @frozen
 class SwitchSetting:
-    """How the switches stand: `on` are those that are; None where the program asks none. And what the control does.
+    """One position of the block delete switches, and the motions of the program in it.
 
-    setup  says so
+    on     the switches that are on; None for a program without skippable blocks
+    setup  the setup with the switches in this position
     """
 
     on: frozenset[int] | None
@@ -70,12 +72,12 @@ class SwitchSetting:
 
     @property
     def name(self) -> str:
-        """In words."""
+        """The position in words, see `named`."""
         return named(self.on or (), self.trace.switches)
 
 
 def named(on: Iterable[int], switches: Iterable[int]) -> str:
-    """A position of switches in words: `off`, `on`, and which where there are several."""
+    """A position of the switches in words: `off`, `on`, or `on for ... only` if some of several are on."""
     on, switches = frozenset(on), frozenset(switches)
     if not on:
         return "off"
@@ -83,44 +85,45 @@ def named(on: Iterable[int], switches: Iterable[int]) -> str:
 
 
 def positions_of(setup: Setup, follow: Follow) -> tuple[SwitchSetting, ...]:
-    """A program followed in all positions of the switches that it asks, or in the one that the setup states.
+    """The program followed in all positions of its switches, or only in the one that the setup states.
 
-    The first has all of them off, if it is not stated. Raises what `follow` raises, of switches that are on with these
-    words; UsageError with what all positions lack; RefusedError NCF452 for more switches than can be looked at.
+    Unless the setup states it, the first position has all switches off. Raises what `follow` raises (with the switches
+    that are on named in the text), UsageError with everything that is lacking in any position, and RefusedError NCF452
+    for more than `MOST_SWITCHES` switches.
     """
     if setup.block_skip is not None:
         trace, stated = follow(setup), setup.block_skip
         on = trace.switches & stated if isinstance(stated, frozenset) else trace.switches if stated else frozenset()
         return (SwitchSetting(on if trace.switches else None, setup, trace),)
-    found, lacking = {frozenset[int](): _tried(setup, follow)}, list[Message]()
-    switches = _asked(found.values())
-    while len(found) < 2 ** len(switches):
+    outcomes, lacking = {frozenset[int](): _outcome(setup, follow)}, list[Message]()
+    switches = _switches(outcomes.values())
+    while len(outcomes) < 2 ** len(switches):
         if len(switches) > MOST_SWITCHES:
             text = f"the program has {len(switches)} switches of block delete ({named_switches(switches)})"
             hint = f"--block-skip on, off, or the numbers of those that are on: up to {MOST_SWITCHES} are all looked at"
             raise RefusedError.of(TOO_MANY, f"{text}: too many to prove each position of them", None, hint)
         for on in (
-            frozenset(each) for many in range(len(switches) + 1) for each in combinations(sorted(switches), many)
+            frozenset(each) for count in range(len(switches) + 1) for each in combinations(sorted(switches), count)
         ):
-            if on not in found:
-                found[on] = _tried(replace(setup, block_skip=on), follow)
-        switches |= _asked(found.values())
-    for each in found.values():
-        lacking += each.messages if isinstance(each, UsageError) else ()
+            if on not in outcomes:
+                outcomes[on] = _outcome(replace(setup, block_skip=on), follow)
+        switches |= _switches(outcomes.values())
+    for outcome in outcomes.values():
+        lacking += outcome.messages if isinstance(outcome, UsageError) else ()
     if lacking:
         raise UsageError.collected(dict.fromkeys(lacking))
     if not switches:
-        (trace,) = (each for each in found.values() if isinstance(each, Trace))
+        (trace,) = (each for each in outcomes.values() if isinstance(each, Trace))
         return (SwitchSetting(None, setup, trace),)
     return tuple(
         SwitchSetting(on, replace(setup, block_skip=on), replace(each, switches=switches))
-        for on, each in found.items()
+        for on, each in outcomes.items()
         if isinstance(each, Trace)
     )
 
 
-def _tried(setup: Setup, follow: Follow) -> Trace | UsageError:
-    """The program in a position, or what it lacks there."""
+def _outcome(setup: Setup, follow: Follow) -> Trace | UsageError:
+    """The program followed in one position, or the error that says what the setup does not give for it."""
     try:
         return follow(setup)
     except UsageError as error:
@@ -136,14 +139,14 @@ def _tried(setup: Setup, follow: Follow) -> Trace | UsageError:
         ) from None
 
 
-def _asked(found: Iterable[Trace | UsageError]) -> frozenset[int]:
-    return frozenset[int]().union(*(each.switches for each in found if isinstance(each, Trace)))
+def _switches(outcomes: Iterable[Trace | UsageError]) -> frozenset[int]:
+    return frozenset[int]().union(*(each.switches for each in outcomes if isinstance(each, Trace)))
 
 
 def in_pairs(
     first: Sequence[SwitchSetting], second: Sequence[SwitchSetting]
 ) -> Iterator[tuple[SwitchSetting, SwitchSetting]]:
-    """Two programs in the same positions of block delete; a program does not mind switches that it does not ask."""
+    """Two programs paired in each position of block delete. A switch that a program lacks does not affect it."""
     if len(first) == len(second) == 1:
         yield first[0], second[0]
         return
@@ -153,18 +156,21 @@ def in_pairs(
         yield one, other
 
 
-# -- what there is to say ---------------------------------------------------------------------------------------------
+# -- messages ---------------------------------------------------------------------------------------------------------
 
 
 def messages_of(positions: Sequence[SwitchSetting]) -> tuple[Message, ...]:
-    """What there is to say of a program in all positions, once each; of block delete, that all were looked at."""
-    told = [each for position in positions for each in position.trace.messages]
+    """The messages of all positions, without duplicates, and one that says that all positions were followed.
+
+    `NEVER` (NCF249, a block that is not executed) is kept only if it is given in every position.
+    """
+    messages = [each for position in positions for each in position.trace.messages]
     if len(positions) == 1:
-        return tuple(told)
-    places = [each.place for each in told if each.code == BLOCK_DELETE]
+        return tuple(messages)
+    places = [each.place for each in messages if each.code == BLOCK_DELETE]
     always = set.intersection(*({each.text for each in position.trace.messages} for position in positions))
     rest = dict.fromkeys(
-        each for each in told if each.code != BLOCK_DELETE and (each.code != NEVER or each.text in always)
+        each for each in messages if each.code != BLOCK_DELETE and (each.code != NEVER or each.text in always)
     )
     first = min(filter(None, places), key=lambda place: place.line, default=None)
     (switches, *_), many = (each.trace.switches for each in positions), len(positions)
@@ -174,7 +180,7 @@ def messages_of(positions: Sequence[SwitchSetting]) -> tuple[Message, ...]:
 
 
 def worst_findings(every: Sequence[WrittenPlan]) -> list[tuple[Finding, ...]]:
-    """The findings in each position, each block's only where its figure is the largest of all of them."""
+    """The findings of each position; each block only in the position in which its figure is largest."""
     if len(every) == 1:
         return [every[0].plan.findings]
     worst, where = dict[tuple[str, int], float](), dict[tuple[str, int], tuple[int, int]]()
@@ -194,12 +200,12 @@ def worst_findings(every: Sequence[WrittenPlan]) -> list[tuple[Finding, ...]]:
 
 
 def assumed_of(positions: Sequence[SwitchSetting]) -> tuple[str, ...]:
-    """What was taken as zero in any position, in words."""
+    """The names of all values that were taken as zero in any position."""
     return tuple(dict.fromkeys(name for each in positions for name in each.trace.assumed))
 
 
 def stamped(positions: Sequence[SwitchSetting]) -> str:
-    """What the stamp says of block delete; empty for a program without."""
+    """The words of the stamp about block delete; empty for a program without skippable blocks."""
     if positions[0].on is None:
         return ""
     if len(positions) == 1:
@@ -212,9 +218,10 @@ def stamped(positions: Sequence[SwitchSetting]) -> str:
 
 @frozen
 class JointPlan:
-    """The plan for each position, and the text of all.
+    """The plan for each position, and the one text for all of them.
 
-    added_blocks  lines added
+    splices       the edits of the program's text
+    added_blocks  number of lines that the edits add
     """
 
     plans: tuple[WrittenPlan, ...]
@@ -232,54 +239,57 @@ def plan_and_write_all(
     first: AcceptedPlan | None = None,
     refused: Mapping[int, Reason] = NONE,
 ) -> JointPlan:
-    """Plan and write a program so that all positions agree on the text; `moves` and `readings` of each of them.
+    """Plan and write a program so that all positions of block delete agree on the text.
 
-    before, first  of a program in one position, see `plan_and_write`
-    refused        blocks that are refused whatever the plan is, and why; without `first`
+    moves, readings  one for each position
+    before, first    for a program in a single position only, see `plan_and_write`
+    refused          block -> why it is refused, whatever the plan is; not together with `first`
     """
     if len(moves) == 1:
         solution = plan_and_write(program, moves[0], machine, options, readings[0], before, first, refused)
         return JointPlan((solution,), solution.emission.splices, solution.emission.added_blocks)
     refused, whole = dict(refused), _starting_elsewhere(moves)
-    spelled, resting, left, tried = dict[int, Mask](), set[int](), set[int](), set[int]()
+    spelled, resting, passed, tried = dict[int, Mask](), set[int](), set[int](), set[int]()
     while True:
-        found: list[WrittenPlan] = []
+        plans: list[WrittenPlan] = []
         for k, own in enumerate(moves):
             twin = next((j for j in range(k) if equal(own, moves[j]) and equal(readings[k], readings[j])), None)
             if twin is not None:
-                found.append(found[twin])
+                plans.append(plans[twin])
                 continue
-            held = _left(_held(own, whole, spelled, resting), left)
-            found.append(plan_and_write(program, held, machine, options, readings[k], refused=refused))
-        more = {block: why for each in found for block, why in each.reasons.items()}
-        if more.keys() > refused.keys():
-            refused = more
+            restricted = _passing(_restricted(own, whole, spelled, resting), passed)
+            plans.append(plan_and_write(program, restricted, machine, options, readings[k], refused=refused))
+        all_refused = {block: why for each in plans for block, why in each.reasons.items()}
+        if all_refused.keys() > refused.keys():
+            refused = all_refused
             continue
-        edits = [_by_block(program, each.emission.splices) for each in found]
+        edits = [_by_block(program, each.emission.splices) for each in plans]
         differing = _differing(moves, edits)
         if not differing:
-            return _merged(found, edits)
+            return _merged(plans, edits)
         if differing <= refused.keys():
             raise AssertionError(f"blocks {sorted(differing)} are unchanged and yet differ")
         for block in differing - spelled.keys():
-            spelled[block] = _named(found, block)
+            spelled[block] = _displaced_axes(plans, block)
             whole.add(block)
             differing.remove(block)
-        rapids = {block for block in differing - left if all(map(_only_rapids, moves, repeat(block)))}
-        left |= rapids & tried
+        rapids = {block for block in differing - passed if all(map(_only_rapids, moves, repeat(block)))}
+        passed |= rapids & tried
         resting = resting - differing | rapids - tried
         tried |= rapids
         differing -= rapids
         deletable = np.array([any(isinstance(item, Skip) for item in each.items) for each in program.templates])
-        for block in differing:  # because of the nearest block with a `/` before it, or of that block itself
+        for block in differing:  # the cause is the nearest skippable block up to and including this one
             causes = np.flatnonzero(deletable[program.template[: block + 1]])
             refused[block] = Reason(DIFFERS, WHY, int(causes[-1]) if causes.size else -1)
 
 
-def _held(moves: Moves, whole: set[int], spelled: Mapping[int, Mask], resting: set[int]) -> Moves:
-    """The motions, those of blocks `whole` not to be split, and of `spelled` with words for the axes that need one.
+def _restricted(moves: Moves, whole: set[int], spelled: Mapping[int, Mask], resting: set[int]) -> Moves:
+    """The motions with restrictions on how these blocks may be written.
 
-    In blocks `resting` axes that have no word get none.
+    whole    blocks whose motions must not be split
+    spelled  block -> (n_axes,) axes that must get a word
+    resting  blocks in which an axis without a word gets none
     """
     if whole:
         moves = replace(moves, compensated=moves.compensated | np.isin(moves.block, list(whole)))
@@ -294,8 +304,8 @@ def _held(moves: Moves, whole: set[int], spelled: Mapping[int, Mask], resting: s
     return replace(moves, spelled=named & ~moves.programmed)
 
 
-def _left(moves: Moves, blocks: set[int]) -> Moves:
-    """The motions, rapids of these blocks left as they are: where their words lead depends on what is skipped."""
+def _passing(moves: Moves, blocks: set[int]) -> Moves:
+    """The motions; those of these blocks pass uncorrected, because their path depends on which blocks are skipped."""
     if not blocks:
         return moves
     rows = np.isin(moves.block, list(blocks)) & (moves.rule == Rule.CORRECT)
@@ -306,9 +316,9 @@ def _left(moves: Moves, blocks: set[int]) -> Moves:
 
 
 def _only_rapids(moves: Moves, block: int) -> bool:
-    """Whether a block does nothing but lead axes, each by its own word, in rapids that are corrected, or pass.
+    """Whether a block consists of absolute rapids that are corrected or passed, and no cut begins where one ends.
 
-    Nor may a cut begin where it ends.
+    Frames that mix axes (rotations) are excluded: there a word moves more than its own axis.
     """
     own = moves.block == block
     rapid = (moves.kind == MotionKind.RAPID) & (moves.rule != Rule.REFUSE) & ~moves.incremental
@@ -318,46 +328,46 @@ def _only_rapids(moves: Moves, block: int) -> bool:
     return bool((rapid[own] & ~np.isin(np.flatnonzero(own), begun)).all()) and not any(turned)
 
 
-def _named(found: Sequence[WrittenPlan], block: int) -> Mask:
-    """(n_axes,) the axes that a block leads anywhere, in any position."""
-    axes = np.zeros(len(found[0].moves.axes), dtype=np.bool_)
-    for each in found:
-        rows = np.flatnonzero(each.moves.block == block)
-        last = each.plan.pieces.last[rows]
-        off = each.emission.end[last] != each.emission.start[rows]
-        axes |= (off & ~np.isnan(each.emission.end[last])).any(axis=0)
+def _displaced_axes(plans: Sequence[WrittenPlan], block: int) -> Mask:
+    """(n_axes,) the axes that a block moves, in any position."""
+    axes = np.zeros(len(plans[0].moves.axes), dtype=np.bool_)
+    for plan in plans:
+        rows = np.flatnonzero(plan.moves.block == block)
+        last = plan.plan.pieces.last[rows]
+        moved = plan.emission.end[last] != plan.emission.start[rows]
+        axes |= (moved & ~np.isnan(plan.emission.end[last])).any(axis=0)
     return axes
 
 
 def _by_block(program: Program, splices: Splices) -> Mapping[int, Edits]:
-    """Edits by the block in which they are."""
+    """The edits of each block that has any."""
     blocks = np.searchsorted(program.blocks[:, 0], splices.start, side="right") - 1
-    found = defaultdict[int, Edits](tuple)
+    edits = defaultdict[int, Edits](tuple)
     for block, edit in zip(blocks.tolist(), splices.edits(), strict=True):
-        found[block] += (edit,)
-    return found
+        edits[block] += (edit,)
+    return edits
 
 
 def _differing(moves: Sequence[Moves], edits: Sequence[Mapping[int, Edits]]) -> set[int]:
-    """The blocks of which positions in which they are executed want different things."""
+    """The blocks whose edits differ between two positions that both execute them."""
     wanted, differing = dict[int, Edits](), set[int]()
-    for own, done in zip(moves, edits, strict=True):
-        for block in {*own.block.tolist(), *done}:
-            if wanted.setdefault(block, done.get(block, ())) != done.get(block, ()):
+    for own, edits_here in zip(moves, edits, strict=True):
+        for block in {*own.block.tolist(), *edits_here}:
+            if wanted.setdefault(block, edits_here.get(block, ())) != edits_here.get(block, ()):
                 differing.add(block)
     return differing
 
 
-def _merged(found: Sequence[WrittenPlan], edits: Sequence[Mapping[int, Edits]]) -> JointPlan:
-    """The text of all positions: they agree on blocks that several of them execute."""
-    wanted = {block: own for done in edits for block, own in done.items()}
+def _merged(plans: Sequence[WrittenPlan], edits: Sequence[Mapping[int, Edits]]) -> JointPlan:
+    """The one text of all positions, whose edits agree wherever several of them execute a block."""
+    wanted = {block: own for edits_here in edits for block, own in edits_here.items()}
     every = [edit for block in sorted(wanted) for edit in wanted[block]]
     ends = b"\n" if any(b"\n" in edit.text for edit in every) else b"\r"
-    return JointPlan(tuple(found), Splices.of(every), sum(edit.text.count(ends) for edit in every))
+    return JointPlan(tuple(plans), Splices.of(every), sum(edit.text.count(ends) for edit in every))
 
 
 def equal(one: object, other: object) -> bool:
-    """Whether two values are the same: numbers to the last bit, and what is not known like itself."""
+    """Whether two values are equal, field by field: numbers to the last bit, NaN equal to NaN."""
     if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
         return np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
@@ -370,14 +380,14 @@ def equal(one: object, other: object) -> bool:
 
 
 def _starting_elsewhere(moves: Sequence[Moves]) -> set[int]:
-    """The blocks whose motions do not start at the same places in all positions in which they are executed."""
+    """The blocks whose motions start at different places in different positions."""
     starts, elsewhere = dict[int, bytes](), set[int]()
     for own in moves:
-        found, places = defaultdict[int, bytes](bytes), np.round(own.start, GRAIN) + 0.0
+        own_starts, places = defaultdict[int, bytes](bytes), np.round(own.start, POSITION_DECIMALS) + 0.0
         places[np.isnan(places)] = np.nan
         for block, place in zip(own.block.tolist(), places, strict=True):
-            found[block] += place.tobytes()
-        elsewhere |= {block for block, start in found.items() if starts.setdefault(block, start) != start}
+            own_starts[block] += place.tobytes()
+        elsewhere |= {block for block, start in own_starts.items() if starts.setdefault(block, start) != start}
     return elsewhere
 
 
@@ -386,10 +396,10 @@ def _starting_elsewhere(moves: Sequence[Moves]) -> set[int]:
 
 @mutable
 class WholeProof:
-    """The proof of a whole program, in each position of block delete.
+    """The proof of a whole program, in each position of block delete: reads and follows the corrected text.
 
-    follows   traces a text, in each of them
-    attempts  how many are left
+    follows   for each position, the function that traces a text
+    attempts  number of attempts that are left
     """
 
     program: Program
@@ -397,7 +407,7 @@ class WholeProof:
     attempts: int = ATTEMPTS
 
     def misreadings(self, continued: object, joint: JointPlan, text: bytes) -> Readings | None:
-        """See `driver.Proof.misreadings`. RefusedError NCF453 where no text is right in all of several positions."""
+        """See `driver.Proof.misreadings`. RefusedError NCF453 if no text is right in all of several positions."""
         if text == self.program.source:
             return None
         try:

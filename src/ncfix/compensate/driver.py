@@ -1,15 +1,16 @@
-"""A program in, a corrected program out, and the proof of what that does to the path.
+"""The correction of one program: plan, write, and prove by following the corrected text again.
 
     Program --trace--> Moves --plan--> Pieces --emit--> edits --apply--> text --read, trace--> Moves again
 
-The text that comes out is read and followed again before anybody gets it: the control must understand exactly what the
-plan meant. If it would not, that is a fault of ncfix, and nothing is written.
+The corrected text is read and followed again before it is given out: the control must understand exactly what the plan
+meant. If it would not, that is a fault of ncfix, and nothing is written.
 
-A whole program is one part (`fix_program`). A long one is corrected while it is read, part after part, in memory that
-does not depend on its length (`Stream`): every part goes through the same plan, emitter, checks and proof, and what
-comes out is the same, byte for byte. A part begins with the last motion of the one before it, which is written already:
-all that one part has to know of the earlier ones is what that motion left (`PrecedingMotion`). What cannot be done that
-way raises `NotInPartsError`, and the caller takes the program as a whole. Several processes may share it: `workers`.
+A whole program is one part (`fix_program`). A long program is corrected while it is read, part after part, in memory
+that does not depend on its length (`Stream`). Every part goes through the same plan, emitter, checks and proof, and the
+output is the same, byte for byte. A part begins with the last motion of the part before it, whose text is written
+already: that motion is all that a part needs to know of the earlier ones (`PrecedingMotion`). A program that cannot be
+corrected in parts raises `NotInPartsError`; the caller then corrects it as a whole. Several processes may share the
+parts of one program: see `workers`.
 """
 
 from __future__ import annotations
@@ -71,24 +72,24 @@ from ncfix.values import frozen, mutable
 from ncfix.writer.emit import Emission
 from ncfix.writer.language import WrittenLanguage
 
-ASTRAY = 1.0
-"""mm; no correction and no remainder of one is so large."""
+ASTRAY_MM = 1.0
+"""Tip error, mm, that no corrected path reaches: a larger one means that the path is a different one."""
 FREE_ATTEMPTS = 4
-"""After so many attempts what one of them has refused stays refused, so that they come to an end."""
+"""Number of attempts after which a block that was refused in one attempt stays refused, so that the attempts end."""
 
 
 class Proof(Protocol):
-    """Reads a text that was written again, and follows it."""
+    """Reads and follows the corrected text again."""
 
     def misreadings(self, continued: ContinuedPart, joint: JointPlan, text: bytes) -> Readings | None:
-        """What a control makes of the text, if that is not what was meant, for another attempt; None if it is.
+        """The control's reading of a text that does not mean what was planned, for another attempt; None if it does.
 
-        Raises `SelfCheckError` for a text that cannot be read, or that never is right, `NotInPartsError` for one that
-        is not right and part of a program.
+        Raises `SelfCheckError` for a text that cannot be read or that no attempt makes right, and `NotInPartsError` for
+        the text of a part that can only be made right in the whole program.
         """
 
     def astray(self, line: int | None, errors: PathError) -> Exception:
-        """What to raise for a path that is no longer that of the program at all."""
+        """The exception to raise for a corrected path that is no longer that of the program, see `strays`."""
 
 
 # -- one part ---------------------------------------------------------------------------------------------------------
@@ -98,9 +99,9 @@ class Proof(Protocol):
 class ProvedPart:
     """A part that has been corrected and proved.
 
-    text       what it is now; how many bytes that are, where it has been put into a file
-    tally      what there is to report of it
-    next_line  of the program, with which the next part begins
+    text       its corrected text; or the number of its bytes, if it has been written into a file
+    tally      its share of the report
+    next_line  number of the line of the program with which the next part begins
     """
 
     text: bytes | int
@@ -108,27 +109,27 @@ class ProvedPart:
     next_line: int
 
     def written_into(self, file: int, at: int) -> ProvedPart:
-        """Put the text into a file, from a byte on; the part without it."""
+        """Write the text into a file, from byte `at` on; returns the part with the length instead of the text."""
         assert isinstance(self.text, bytes)
         put_at(file, at, self.text)
         return replace(self, text=len(self.text))
 
 
 Watch = Callable[[Program, WrittenPlan, Mask | None], object]
-"""Is shown each part that has been corrected: its program, its plan, and which motions are its own."""
+"""Called with each corrected part: its program, its plan, and (n,) the motions that are its own (None: all)."""
 
 
 @mutable
 class Corrector:
     """Corrects a part of a program, or all of it.
 
-    machine  with the workpiece in its place
-    said     what the stamp says: the position of block delete, and what was taken as zero, see `stamp_of`
+    machine  the machine with the workpiece at its place
+    said     returns the words for the stamp: position of block delete, names of values taken as zero, see `stamp_of`
     head     the first part
-    at       where the stamp stands in what is written
-    stamped  the stamp, as far as it was known then; empty if there is none
-    joint what was planned and written last
-    watch    is shown what was corrected
+    at       byte at which the stamp stands in the corrected text
+    stamped  the stamp as it was written with the first part; empty if there is none
+    joint    the plan and text of the latest part
+    watch    is called with each corrected part
     """
 
     task: Task
@@ -142,7 +143,7 @@ class Corrector:
     watch: Watch | None = None
 
     def stamp(self) -> bytes:
-        """The stamp as it has to be by what is known now."""
+        """The stamp by what is known now: parts after the first may have added to it."""
         assert self.head is not None
         return stamp.insertion(self.head, stamp_of(self.head, self.task.machine, self.task.options, *self.said())).text
 
@@ -154,22 +155,23 @@ class Corrector:
         before: PrecedingMotion | None = None,
         leave: Callable[[PrecedingMotion, int], object] | None = None,
     ) -> ProvedPart:
-        """Settle, write, prove and count a part.
+        """Plan, write, prove and count a part.
 
-        moves   its motions, in each position of block delete
-        accepted  the plan to begin with, if that has been made already
-        before  what the part before has left
-        leave   is told what this one leaves, and how long its text is, before it is proved; None: nothing comes behind
+        moves     its motions, in each position of block delete
+        accepted  the first plan, if it has been made already
+        before    the last motion of the part before
+        leave     is called with the last motion of this part and the length of its text, bytes, before the proof, so
+                  that another process may go on from there; None if no part follows
         """
         task, part = self.task, continued.joined
         readings: Readings | None = [None] * len(moves)
-        refused, tries = dict[int, Reason](), 0
+        refused, attempts = dict[int, Reason](), 0
         while readings is not None:
             joint = plan_and_write_all(
                 part.program, moves, self.machine, task.options, readings, before, accepted, refused
             )
-            tries += 1
-            if tries > FREE_ATTEMPTS:
+            attempts += 1
+            if attempts > FREE_ATTEMPTS:
                 refused, accepted = {b: why for each in joint.plans for b, why in each.reasons.items()}, None
             solution = joint.plans[0]
             if before is not None and (solution.reaches_back or solution.unchanged[0] != before.unchanged):
@@ -185,18 +187,18 @@ class Corrector:
             own[:1] = False
         tally.add(part.program, joint, own, self.machine)
         if task.options.verify:
-            found = list[tuple[Moves, PathError]]()
+            path_errors = list[tuple[Moves, PathError]]()
             for each in joint.plans:
                 shown = each.shown(task.options.split_rapids)
                 errors = path_error(each.written, shown if own is None else own & shown, each.plan.known)
-                found.append((each.moves, errors))
-            self.note(tally, part.program, *found)
+                path_errors.append((each.moves, errors))
+            self.note(tally, part.program, *path_errors)
         if self.watch is not None:
             self.watch(part.program, solution, own)
         return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
     def _text(self, program: Program, splices: Splices, first: bool) -> bytes:
-        """The corrected text of a part; the first one gets a stamp, if it differs."""
+        """The corrected text of a part. The first part gets the stamp, if its text has changed."""
         if not first:
             stop = int(program.blocks[1, 0]) if len(program) > 1 else len(program.source)
             return spliced(program.source, splices)[stop:]
@@ -209,16 +211,16 @@ class Corrector:
         return spliced(program.source, Splices.joined([splices, Splices.of([edit])]))
 
     def note(self, tally: Tally, program: Program, *errors: tuple[Moves, PathError]) -> None:
-        """Take in the tip errors of a part, in each position of block delete."""
+        """Add the tip errors of a part, in each position of block delete, to its tally; raises `Proof.astray`."""
         lines = tally.figures(program, errors)
-        for line, (_, found) in zip(lines, errors, strict=True):
-            if strays(found):
-                raise self.proof.astray(line, found)
+        for line, (_, path_errors) in zip(lines, errors, strict=True):
+            if strays(path_errors):
+                raise self.proof.astray(line, path_errors)
 
 
 def strays(errors: PathError) -> bool:
-    """Whether the corrected path is no longer that of the program at all."""
-    return errors.after.max > max(ASTRAY, 10 * errors.before.max)
+    """Whether the corrected path is so far from the programmed one that it must be a different path."""
+    return errors.after.max > max(ASTRAY_MM, 10 * errors.before.max)
 
 
 # -- a whole program --------------------------------------------------------------------------------------------------
@@ -226,10 +228,10 @@ def strays(errors: PathError) -> bool:
 
 @frozen
 class Fixed:
-    """The corrected program, whether it differs from the original, and what there is to report.
+    """The corrected program, whether it differs from the original, and the report.
 
-    lines  of a program that was written out flat: the line of the original of each of its lines
-    made   how it was corrected; None for a machine without errors
+    lines  for a program that was written out flat: the original line number of each of its lines; else empty
+    made   what it was corrected with; None for a machine without errors
     """
 
     text: bytes
@@ -241,11 +243,11 @@ class Fixed:
 
 @frozen
 class Made:
-    """What a program was corrected with.
+    """The program, plan and edits from which a corrected text was made.
 
     program  as it was read, or as it was written out flat
-    plan     its motions, in the first position of block delete
-    edits    what they replace in its text; with the stamp
+    plan     the plan for the first position of block delete
+    edits    the edits of the text, for all positions, with the stamp
     """
 
     program: Program
@@ -260,13 +262,13 @@ def fix_program(
     options: FixOptions = FixOptions(),  # noqa: B008
     resolve: Resolve | None = None,
 ) -> Fixed:
-    """Correct a program for a machine. A program that needs no change comes back as it is, without a stamp.
+    """Correct a program for a machine. A program that needs no change is returned unchanged, without a stamp.
 
-    resolve  gives the text of a subprogram file by its name
+    resolve  returns the text of a subprogram file by its name
 
-    Raises SourceError for what cannot be followed or is not known, RefusedError NCF430 for a program that carries a
-    stamp, NCF438 for one that seems to have been corrected without one. Motions that had to be left uncorrected are in
-    `report.refused`; whether that is acceptable is for the caller to decide.
+    Raises SourceError for a block that cannot be followed, UsageError for values that the setup must give, RefusedError
+    NCF430 for a program that carries a stamp, and NCF438 for one without a stamp that seems to have been corrected.
+    Motions that had to stay uncorrected are in `report.refused`; the caller decides whether that is acceptable.
     """
     refuse_stamped(program, options)
     if machine.is_perfect:
@@ -280,8 +282,8 @@ def fix_program(
     positions = positions_of(setup, lambda own: with_tool_lengths(program, follow(program, own), machine, own))
     moves, words = [each.trace.moves for each in positions], (stamped(positions), assumed_of(positions))
     proof = WholeProof(program, [partial(follow, own=each.setup) for each in positions])
-    there = with_workpiece(resolving(machine, program.dialect, program.source), setup)
-    corrector = Corrector(task, there, proof, lambda: words)
+    set_up = with_workpiece(resolving(machine, program.dialect, program.source), setup)
+    corrector = Corrector(task, set_up, proof, lambda: words)
     done = corrector.correct(ContinuedPart.whole(program, moves[0], corrector.machine), moves)
     tally, text, joint = done.tally, done.text, corrector.joint
     assert isinstance(text, bytes)
@@ -301,12 +303,12 @@ def fix_program(
 def fix_flat(
     program: Program, machine: Machine, setup: Setup, options: FixOptions, resolve: Resolve | None = None
 ) -> Fixed:
-    """As `fix_program`; where that refuses motions, the program is written out flat and corrected so.
+    """Like `fix_program`; if that refuses motions, the program is written out flat and the flat program is corrected.
 
-    A program that can be corrected as it is keeps its loops and subprograms, and the flat one is kept only if it helps.
-    One in which nothing moves would lose all its blocks: it stays, too.
-    The report speaks of the lines of the original. A flat program has the numbers of one position of block delete, so a
-    program that is to be right in several stays as it is. Raises what `fix_program` and `flatten` raise.
+    A program that can be corrected as it is keeps its loops and subprograms. The flat program is used only if fewer
+    lines are refused in it. A program in which nothing moves stays as it is, because flat it would lose all its blocks;
+    so does one that must be right in several positions of block delete, because a flat program has the numbers of one
+    position only (NCF447). The report gives lines of the original. Raises what `fix_program` and `flatten` raise.
     """
     fixed = fix_program(program, machine, setup, options, resolve)
     if not (fixed.report.refused and fixed.report.moves):
@@ -331,7 +333,7 @@ def fix_flat(
 
 
 class PartCorrector(Corrector):
-    """Goes through a program and corrects its parts, or some of them. `work` is called once."""
+    """Reads a program part by part and corrects the parts of its share. `work` can be called once only."""
 
     def __init__(self, task: Task, read: Read) -> None:
         self.parts = parts = MachineParts.of(task, read)
@@ -340,9 +342,10 @@ class PartCorrector(Corrector):
         self.planner, self.language = Planner.of(self.machine, task.options), language_of(task.dialect, WrittenLanguage)
 
     def work(self, share: WorkShare) -> Iterator[tuple[int, ProvedPart]]:
-        """The number of each part of the share, and what it has become; the others are followed, or passed over.
+        """The number of each part of the share, and its correction. Other parts are only followed, or passed over.
 
-        Raises what reading, following and correcting do, and at last UsageError for what the setup does not give.
+        Raises what reading, following and correcting raise and, at the end, UsageError for everything that the setup
+        does not give.
         """
         skipped, self.parts.share = False, share
         for number, continued in enumerate(self.parts):
@@ -354,7 +357,10 @@ class PartCorrector(Corrector):
             skipped = False
 
     def _corrected(self, continued: ContinuedPart, number: int, share: WorkShare, skipped: bool) -> ProvedPart:
-        """Correct a part, hand on what the next one has to know, and prove it; `skipped`: the one before was not."""
+        """Correct a part, hand its last motion on to the next part, and prove it.
+
+        skipped  the part before was not corrected in this process
+        """
         if continued.head is not None and is_offset(continued.head.moves).any():
             raise NotInPartsError("the control offsets a contour from one part into the next")
         plan = None if self.planner is None else self.planner.plan(continued)
@@ -370,11 +376,11 @@ class PartCorrector(Corrector):
         if before is not None:
             before, (first, *_) = replace(before, direction=continued.direction), before.rounds
             if first.unchanged.any() or (moves.wordless[0] & (first.shift != 0)).any():
-                accepted = None  # the motion before was left as it was, or an axis goes on standing off its place
+                accepted = None  # the motion before stayed unchanged, or an axis without a word stays displaced
         return self.correct(continued, [moves], accepted, before, partial(share.leave, number))
 
     def _plainly(self, plan: PlainPlan, plain: Emission, number: int, share: WorkShare) -> ProvedPart:
-        """Finish a part of plain motions."""
+        """Hand on, prove and count a part of plain motions that is planned and written."""
         part, moves = plan.part, plan.part.moves
         text = spliced(part.program.source, plain.splices)
         if not part.last:
@@ -392,7 +398,7 @@ class PartCorrector(Corrector):
         return ProvedPart(text, tally, part.program.first_line + part.program.lines_ended)
 
     def _accepted_plan(self, continued: ContinuedPart) -> AcceptedPlan:
-        """The plan of a part by the long way, as far as it does not depend on what the part before has left."""
+        """The full plan of a part, assuming that the motion before it is corrected without any remainder."""
         part, task = continued.joined, self.task
         nowhere = np.zeros(len(part.moves.axes))
         guess = None if continued.head is None else PrecedingMotion.steady(nowhere, continued.direction, nowhere)
@@ -407,7 +413,7 @@ class PartCorrector(Corrector):
 
 @frozen
 class Stamp:
-    """Where the stamp stands in what was written, what it is now, and what it has to be (empty: there is none)."""
+    """The stamp in the output: its byte, its text as written, and its text as it must be (empty: no stamp)."""
 
     at: int
     written: bytes
@@ -416,7 +422,7 @@ class Stamp:
 
 @frozen
 class Streamed:
-    """What was done, and the stamp, which may say more at the end than could be known at the beginning."""
+    """The report, and the stamp: its final text may differ from the one that was written with the first part."""
 
     report: FixReport
     stamp: Stamp
@@ -424,14 +430,14 @@ class Streamed:
 
 @mutable
 class Stream:
-    """One program on its way. `run` is called once.
+    """The correction of one program part by part. `run` can be called once only.
 
-    read   gives the next so many bytes of the text; none at its end
-    write  takes the corrected text, part by part; or how much of it stands where it belongs already (`OpenFiles.out`)
-    jobs   processes that work on it
-    files  the files, which all of them have; without it there is one process
-    suspicion  what makes one think that the program was corrected before; None: not judged yet
-    watch      is shown each part; one process only then
+    read       returns the next `size` bytes of the text; no bytes at its end
+    write      takes the corrected text, part by part; or the number of bytes that are in `OpenFiles.out` already
+    jobs       number of processes
+    files      the open files that the processes share; None: one process
+    suspicion  messages that the program seems to have been corrected before; None: not judged yet
+    watch      is called with each corrected part; then there is only one process
     """
 
     task: Task
@@ -449,7 +455,7 @@ class Stream:
 
     @property
     def stamped(self) -> bytes:
-        """The stamp as it was written; empty as long as there is none."""
+        """The stamp as it was written; empty if none has been written yet."""
         return b"" if self.corrector is None else self.corrector.stamped
 
     def run(self) -> Streamed:
@@ -464,7 +470,7 @@ class Stream:
                 others.put(number, done)
                 self._take(others.ready())
             self._take(others.rest(own.parts.count))
-        for text in own.parts.behind():  # goes out as it came in
+        for text in own.parts.behind():  # written unchanged
             if stamp.SIGN.search(text.decode("latin-1")) and not task.options.force:
                 raise NotInPartsError("there is a stamp after the end of the program")
             self.write(text)
@@ -473,7 +479,7 @@ class Stream:
         return Streamed(report, Stamp(own.at, own.stamped, own.stamp() if self.tally.changed else b""))
 
     def _take(self, parts: Iterator[ProvedPart]) -> None:
-        """Write parts, and report them."""
+        """Write the parts and add them to the report."""
         for done in parts:
             self.tally.take(done.tally)
             if done.next_line > LOOKED:
@@ -482,7 +488,7 @@ class Stream:
                 self.write(done.text)
 
     def _judged(self) -> tuple[Message, ...]:
-        """Judge the program by its beginning, once; raises RefusedError NCF438 (see `suspected`)."""
+        """Judge, once, by the first lines whether the program was corrected before; raises RefusedError NCF438."""
         if self.suspicion is None:
             force = self.task.options.force
             self.suspicion = suspected(self.tally.numbers, self.tally.step, self.task.path, force)

@@ -1,13 +1,11 @@
-"""A program followed on a certain machine, and whether it was corrected before.
+"""A program followed on a machine, with workpiece and tool lengths, and whether it was corrected before.
 
-It is followed with the workpiece where the setup has it, and with every tool length.
-
-A program that was corrected carries a stamp. If that is gone, its numbers still tell: people and CAM systems write
-round numbers; a correction makes them crooked. If a program's coordinates are crooked, and become round when the errors
-of the machine are put into them, then it was written for these errors. Correcting it again would put the errors back
-in, the other way round, as large as they were, and nothing later on would show it. A number is round here if it lies
-within one step of the control's digits of a grid that is ten times coarser. Of numbers with all digits used as many
-become round as cease to be, by chance; nothing is said of them.
+A corrected program carries a stamp. If the stamp is gone, the numbers still tell: people and CAM systems write round
+numbers, and a correction makes them crooked. If the coordinates of a program are crooked, and become round when the
+errors of this machine are added to them, then the program was written for these errors. Correcting it again would apply
+the correction twice, which leaves an error as large as the original one, and no later check would show it. A number is
+round here if it lies within one least increment of a grid that is ten times coarser. In a program whose numbers use all
+digits, by chance as many numbers become round as cease to be; such a program is not suspected.
 """
 
 from __future__ import annotations
@@ -44,9 +42,9 @@ FORCE = "fix the original program, or say --force if this is it"
 
 @frozen
 class Followed:
-    """What the machine does with a program.
+    """A program followed on a machine.
 
-    machine  the machine with the workpiece in its place
+    machine  the machine with the workpiece at its place
     trace    the motions, with every tool length known
     """
 
@@ -57,8 +55,8 @@ class Followed:
 def follow(program: Program, machine: Machine, setup: Setup, resolve: Resolve | None = None) -> Followed:
     """Follow a program on a machine; `resolve` gives the text of a subprogram file by its name.
 
-    Raises SourceError for what cannot be followed, UsageError for what is used and not given: NCF431 for the lengths of
-    tools, where the errors of the machine depend on them.
+    Raises SourceError for a block that cannot be followed, and UsageError for a value that is used and not given
+    (NCF431 for tool lengths, if the errors of the machine depend on them).
     """
     found = traced(program, machine, setup, resolve)
     return Followed(with_workpiece(machine, setup), with_tool_lengths(program, found, machine, setup))
@@ -72,17 +70,20 @@ def traced(program: Program, machine: Machine, setup: Setup, resolve: Resolve | 
 
 @frozen
 class Positions:
-    """What a machine's kinematics say about positions of its axes."""
+    """The kinematics of a machine, as the control's interpreter uses them (`Kinematics`)."""
 
     machine: Machine
 
     @property
     def travel(self) -> Sequence[tuple[float, float]]:
-        """How far each axis goes, mm and rad."""
+        """(low, high) end of travel of each axis, mm and rad."""
         return [(low, high) for low, high in self.machine.ranges.tolist()]
 
     def __call__(self, command: Sequence[float], before: TcpState, after: TcpState, /) -> Sequence[float]:
-        """A command as it is with tool-centre-point control or without, said as it is under another state."""
+        """The command that, under state `after`, means the axis positions of `command` under state `before`.
+
+        A state says whether tool-centre-point control (TCP) is on, and gives the tool length, mm.
+        """
         row = np.array([command], dtype=np.float64)
         q = joints_from_commands(self.machine, row, np.array([before.on]), np.array([before.tool_length]))
         found = commands_from_joints(self.machine, q, np.array([after.on]), np.array([after.tool_length]))
@@ -95,7 +96,7 @@ def kinematics_of(machine: Machine) -> Kinematics | None:
 
 
 def with_workpiece(machine: Machine, setup: Setup) -> Machine:
-    """The machine with the workpiece where the setup has it, under the conditions that the setup gives."""
+    """The machine with the workpiece at the place, and under the conditions, that the setup gives."""
     x, y, z = (a + b for a, b in zip(machine.workpiece_offset, setup.workpiece_offset, strict=True))
     return machine.replace(workpiece_offset=(x, y, z), conditions=dict(setup.inputs))
 
@@ -104,7 +105,9 @@ INCHES = re.compile(rb"(?i)(?<![A-Z])G0*20(?![\d.])")
 
 
 def resolving(machine: Machine, dialect: Dialect, source: bytes) -> Machine:
-    """The machine with what its control resolves in a program in inches, where that is a decimal fraction of an inch.
+    """The machine with the least increment that its control has for this program.
+
+    In a program in inches (G20), controls with decimal inches resolve 0.0001 inch where they resolve 0.001 mm.
 
     source  the text of the program, or its beginning
     """
@@ -122,9 +125,9 @@ def rotary_names(machine: Machine) -> frozenset[str]:
 def with_tool_lengths(program: Program, followed: Trace, machine: Machine, setup: Setup) -> Trace:
     """The trace with every tool length known.
 
-    Where the errors do not depend on it, a length that is not given counts as zero; where they do, it must be given:
-    raises UsageError NCF431 naming every tool that lacks it, unless the setup assumes zero, and NCF446 naming every
-    tool with a length below zero, which is a distance of another kind.
+    If the errors of the machine do not depend on the tool length, a length that is not given counts as zero. If they
+    do, it must be given. Raises UsageError NCF431, which names every tool without a length, unless the setup assumes
+    zero; and NCF446, which names every tool with a length below zero: that is not the length from gauge line to tip.
     """
     moves = followed.moves
 
@@ -166,7 +169,7 @@ def with_tool_lengths(program: Program, followed: Trace, machine: Machine, setup
 
 
 def _first_motions(moves: Moves, chosen: Mask) -> dict[int, int]:
-    """Tool -> the first of the chosen motions (n,) that is made with it, in the order of the program."""
+    """Tool -> the first of the chosen motions (n,) made with it, in the order of the program."""
     rows = np.flatnonzero(chosen & (moves.tool >= 0))
     rows = rows[np.diff(moves.tool[rows], prepend=-1) != 0]
     found: dict[int, int] = {}
@@ -176,16 +179,16 @@ def _first_motions(moves: Moves, chosen: Mask) -> dict[int, int]:
 
 
 PART_BYTES = 1 << 20
-"""How much text is a part: its columns take about forty times as much memory, and stay in the processor's cache."""
+"""Usual size of a part, bytes. Its columns take about forty times as much memory."""
 
 
 @frozen
 class Task:
-    """What all parts of a program have in common.
+    """The task of correcting one program, common to all of its parts.
 
-    resolve  gives the text of a subprogram file by its name
-    size     bytes of a part
-    head     the first bytes of the text, by which it is told what it is; those of the first part, if not given
+    resolve  returns the text of a subprogram file by its name
+    size     usual size of a part, bytes
+    head     the first bytes of the text, from which its unit and dialect are told; empty: those of the first part
     """
 
     machine: Machine
@@ -203,17 +206,17 @@ class Task:
 
     @property
     def step(self) -> float:
-        """What the control resolves, mm."""
+        """The least increment of the control for this program, mm."""
         return resolving(self.machine, self.dialect, self.head).least_increment[0]
 
     def follower(self) -> Follower:
-        """What follows the program."""
+        """A new follower for the program, at its beginning."""
         axes, rotary = self.machine.axis_names, rotary_names(self.machine)
         kinematics = kinematics_of(self.machine)
         return follower_of(self.dialect, Run(self.setup, axes, rotary, self.resolve, kinematics=kinematics))
 
     def check(self) -> None:
-        """Raise `NotInPartsError` for what has to be looked at as a whole."""
+        """Raise `NotInPartsError` if strategy or options need the whole program at once."""
         strategy = get_strategy(self.options.strategy)
         if strategy.corrects_orientation or not strategy.follows_path or self.machine.is_perfect:
             raise NotInPartsError(f"the strategy {strategy.name} looks at the whole path at once")
@@ -222,34 +225,36 @@ class Task:
 
 
 def follower_of(dialect: Dialect, run: Run) -> Follower:
-    """What follows a program part by part."""
+    """A follower that reads a program part by part."""
     language = language_of(dialect, FollowedLanguage)
     return Follower(language.control(run, dialect), run, partial(language.interpreter, in_parts=True))
 
 
 COARSE = 10
-"""Steps of the grid of round numbers, in steps of the control's digits."""
+"""Pitch of the grid of round numbers, in least increments of the control."""
 NEAR = 1.0
-"""Steps within which a number is on the grid; two roundings, of the number and of its correction, are less."""
+"""Distance, in least increments, up to which a number lies on the grid. The two roundings involved, of the number and
+of its correction, add up to less."""
 ENOUGH = 30
-"""Different numbers that have to become round."""
+"""Least number of different commands that have to become round."""
 SURE = 6.0
-"""Standard deviations by which more have to become round than cease to be; by chance, one program in 10^9."""
+"""Least excess of numbers that become round over those that cease to be, in standard deviations. By chance this is
+exceeded in one program of 10^9."""
 LOOKED = 10_000
-"""Lines of a program that are looked at: parts of the usual size have more, so that nothing is in a pipe by then."""
+"""Number of lines by which a program is judged. The first part of a pipe has more, so nothing is written before."""
 MOVED = 0.75
-"""Steps by which a number has to be corrected to say anything."""
+"""Least correction, in least increments, of a number that is counted."""
 
 
 Numbers = Mapping[int, tuple[Array, Array]]
-"""Of each linear axis, by its column: the different commands (k,), and what is added to them (k,), mm."""
+"""Column of a linear axis -> its different commands (k,) and the corrections added to them (k,), mm."""
 
 
 def numbers_of(moves: Moves, change: Array, among: Mask, step: float) -> Numbers:
-    """The commands that change their axis and are corrected, of motions `among` (n,).
+    """The commands that move a linear axis and are corrected, of motions `among` (n,).
 
-    change  (n, n_axes) what is added to the commands at their ends, mm and rad
-    step    of the control's digits, mm
+    change  (n, n_axes) the corrections added to the commands at their ends, mm and rad
+    step    least increment of the control, mm
     """
     new = np.abs(moves.end - moves.start) > step / 2
     said = new & among[:, None] & (np.abs(change) > MOVED * step) & ~moves.rotary
@@ -258,13 +263,13 @@ def numbers_of(moves: Moves, change: Array, among: Mask, step: float) -> Numbers
 
 
 def numbers_together(one: Numbers, other: Numbers, step: float) -> Numbers:
-    """The different numbers of both; of equal ones those that come first."""
+    """The different commands of both; of equal commands, the first."""
     both = {axis: np.hstack([each[axis] for each in (one, other) if axis in each]) for axis in {**one, **other}}
     return {axis: _different(values, change, step) for axis, (values, change) in both.items()}
 
 
 def suspected(numbers: Numbers, step: float, path: str, force: bool, hint: str = FORCE) -> tuple[Message, ...]:
-    """Raise RefusedError NCF438 for a program that seems to have been corrected before; with `force`, only say so."""
+    """Raise RefusedError NCF438 if the program seems to have been corrected before; with `force`, only return it."""
     if not looks_corrected(numbers, step):
         return ()
     text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
@@ -275,9 +280,9 @@ def suspected(numbers: Numbers, step: float, path: str, force: bool, hint: str =
 
 
 def looks_corrected(numbers: Numbers, step: float) -> bool:
-    """Whether the program with these numbers seems to have been corrected before, for this machine.
+    """Whether a program with these commands seems to have been corrected before, for this machine.
 
-    step  of the control's digits, mm
+    step  least increment of the control, mm
     """
     gained, lost = 0, 0
     for before, change in numbers.values():
@@ -295,7 +300,7 @@ def _different(values: Array, change: Array, step: float) -> tuple[Array, Array]
 
 
 def _round(values: Array, step: float) -> Mask:
-    """Which of the values are near a grid of round numbers, wherever it begins: where most of these are."""
+    """(k,) which values are near a grid of round numbers, the offset of which is fitted to the values."""
     grid = COARSE * step
     phase = np.exp(2j * np.pi * values / grid)
     start = np.angle(phase.mean()) / (2 * np.pi) * grid
@@ -303,7 +308,7 @@ def _round(values: Array, step: float) -> Mask:
 
 
 def refuse_stamped(program: Program, options: FixOptions) -> None:
-    """Raise RefusedError NCF430 for a program that carries a stamp, unless that is what the options want."""
+    """Raise RefusedError NCF430 if the program carries a stamp, unless the options say `force`."""
     block = stamp.find(program)
     if block is not None and not options.force:
         text = "the program has been corrected already; correcting it again would put the error back in"
@@ -311,16 +316,16 @@ def refuse_stamped(program: Program, options: FixOptions) -> None:
 
 
 SHORT_LINE = 250
-"""Characters that a line may have on any control."""
+"""Number of characters that a line may have on any control."""
 
 
 def stamp_of(
     program: Program, machine: Machine, options: FixOptions, block_delete: str = "", assumed: tuple[str, ...] = ()
 ) -> str:
-    """The text of the stamp that a corrected program gets.
+    """The text of the stamp of a corrected program.
 
-    block_delete  for which positions of its switches, in words; empty without
-    assumed       names what was taken as zero
+    block_delete  the positions of the switches for which it is right, in words; empty without skippable blocks
+    assumed       names of the values that were taken as zero
     """
     words = (
         f"ncfix {__version__} machine {machine.hash} strategy {options.strategy} tolerance {options.tolerance_um:g} um"

@@ -1,6 +1,6 @@
-"""The text of a program in parts that can be worked on: read and followed one after the other.
+"""A long program in parts, which are read, followed and proved one after the other.
 
-Each part begins behind the last motion of the one before, which is written already.
+Each part is planned together with the last motion of the part before it, whose text is written already.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from ncfix.writer.pieces import SecondReading
 
 FRAMES = "the program takes frames or values from where the machine stands"
 MOST_PENDING = 64
-"""Parts that may be put together before one of them ends where it may."""
+"""Largest number of stretches of text that are joined to find a part that ends at a permitted place (`_ends_clean`)."""
 
 
 @frozen
 class Part:
-    """Text that can be worked on: a program that ends where it may, its motions, and whether it is the last.
+    """One part of a program: its text, its motions, and whether it is the last.
 
-    checkpoint  what stands before it has been passed over, see there
+    checkpoint  if given, only the last block of the part was read; another process has corrected the part
     """
 
     program: Program
@@ -50,23 +50,23 @@ class Part:
 
     @property
     def lines(self) -> Index:
-        """The lines in which the motions are, (n,)."""
+        """(n,) the line number of each motion."""
         return self.program.lines(self.moves.block)
 
 
 @mutable
 class Parts:
-    """Reads and follows a program. `parts` is gone through once.
+    """Reads and follows a program part by part. `parts` can be iterated once only.
 
-    read    gives the next so many bytes of the text; none at its end
-    size    bytes of a part
-    sided   the errors of the machine depend on the way in which its axes move
-    rest    what of the text comes after the end of the program
-    blocks  lines so far
-    tcp     the tip is under control (TCP), or may be
-    share   which parts this process works on
-    found   parts that have been read so far, also those behind which something is lacking
-    told    the last one that others have been told of
+    read    returns the next `size` bytes of the text; no bytes at its end
+    size    usual size of a part, bytes
+    sided   the errors of the machine depend on the direction in which its axes move
+    rest    text that was read and does not belong to a part yet; at the end, the text behind the end of the program
+    blocks  number of lines so far
+    tcp     whether tool-centre-point control was on in the last text, or may have been
+    share   the parts that this process works on
+    found   number of parts read so far, including those after a value was found to be lacking
+    told    number of the last own part that was announced to the other processes
     """
 
     options: FixOptions
@@ -83,7 +83,7 @@ class Parts:
     told: int = -1
 
     def parts(self) -> Iterator[Part]:
-        """The text in parts that end where they may."""
+        """The parts of the text. Each ends behind a straight motion that may be corrected, see `_ends_clean`."""
         pending: list[tuple[Program, Moves]] = []
         for program, last, checkpoint in self._texts():
             refuse_stamped(program, self.options)
@@ -117,7 +117,7 @@ class Parts:
                 return
 
     def behind(self) -> Iterator[bytes]:
-        """The text behind the end of the program, piece by piece; its lines are counted, too."""
+        """The text behind the end of the program, piece by piece. Adds its lines to `blocks`."""
         text = self.rest
         while text:
             ended = text.endswith(b"\n")
@@ -127,18 +127,21 @@ class Parts:
             self.blocks += not text and not ended
 
     def check_behind(self) -> None:
-        """Raise `NotInPartsError` if there is more behind the end of the program than the tape mark."""
+        """Raise `NotInPartsError` if anything but a tape mark (%) stands behind the end of the program."""
         if any(text.strip(b"% \t\r\n") for text in self.behind()):
             raise NotInPartsError("text comes after the end of the program")
 
     def _tell(self, checkpoint: PartCheckpoint | None) -> None:
-        """Tell others of an own part, once: before more text is read, which the first process may wait to hand out."""
+        """Announce an own part to the other processes, once.
+
+        This must happen before more text is read: the first process, which reads for all, may wait for it.
+        """
         if self.share.shares(self.found) and self.told < self.found:
             self.told = self.found
             self.share.announce(self.found, checkpoint)
 
     def _checkpoint(self, program: Program, moves: Moves) -> PartCheckpoint | None:
-        """What others have to know of a part; None if they have to follow it."""
+        """What other processes need to know of a part; None if they have to follow it themselves."""
         control = None if self.sided else self.follower.checkpoint(moves)
         if control is None:
             return None
@@ -147,7 +150,7 @@ class Parts:
         return PartCheckpoint(len(program.source), begin, lines, len(program) - 1, self.tcp, control)
 
     def _passed(self, checkpoint: PartCheckpoint, text: bytes) -> Program:
-        """Pass over a part, which this text begins with, but for its last block."""
+        """Pass over the part with which this text begins; returns its last block, which alone is read."""
         self.rest = text[checkpoint.size :]
         self.reader.first_line += checkpoint.lines
         self.blocks += checkpoint.blocks
@@ -156,15 +159,15 @@ class Parts:
 
     @property
     def _wanted(self) -> int:
-        """How much text the next part shall be: under TCP, which takes more memory, and at first, it is less."""
+        """Wanted size of the next part, bytes: smaller for the first part, and under TCP, which needs more memory."""
         if not self.found:
             return self.size // 8
         return self.size // 3 if self.tcp else self.size
 
     def _texts(self) -> Iterator[tuple[Program, bool, PartCheckpoint | None]]:
-        """The text in parts that end between two blocks of plain words; True with the last one.
+        """Stretches of text that end between two blocks of plain words, True with the last one, and its checkpoint.
 
-        All processes read the same, so that their parts are the same.
+        All processes read the same sizes, so that all of them cut the text at the same places.
         """
         wanted = self._wanted
         while True:
@@ -196,7 +199,7 @@ class Parts:
 
 
 def _ends_clean(program: Program, moves: Moves) -> bool:
-    """Whether another part may follow: the last block is a straight motion that may be corrected, and nothing else."""
+    """Whether a part may end here: its last block is one straight motion that may be corrected, between known ends."""
     if len(moves) < 2 or moves.block[-1] != len(program) - 1 or moves.block[-2] == moves.block[-1]:
         return False
     straight = moves.kind[-1] in (MotionKind.RAPID, MotionKind.FEED) and moves.modal[-1] in (0, 10)
@@ -206,11 +209,11 @@ def _ends_clean(program: Program, moves: Moves) -> bool:
 
 @frozen(slots=False)
 class ContinuedPart:
-    """A part, and the last motion of the one before, which is written already.
+    """A part, with the last motion of the part before it, whose text is written already.
 
     head       that motion and its block; None for the first part
-    direction  (n_axes,) the way in which the axes came to where that motion begins
-    machine    with the workpiece in its place
+    direction  (n_axes,) direction in which each axis came to the start of that motion: -1, 1, or 0 if not known
+    machine    the machine with the workpiece at its place
     """
 
     part: Part
@@ -225,7 +228,7 @@ class ContinuedPart:
 
     @cached_property
     def joined(self) -> Part:
-        """The part behind that motion."""
+        """The part with the motion before it as its first motion."""
         if self.head is None:
             return self.part
         program = joined([self.head.program, self.part.program])
@@ -234,7 +237,7 @@ class ContinuedPart:
 
     @cached_property
     def intent(self) -> Intent:
-        """The part behind that motion on the machine."""
+        """The motions of `joined` on the machine."""
         return Intent(self.machine, self.joined.moves, State(direction=self.direction))
 
 
@@ -242,13 +245,13 @@ class ContinuedPart:
 class MachineParts(Parts):
     """The parts of a program on a machine, with every tool length known. Gone through once.
 
-    machine  as it is; `set_up` with the workpiece where the setup has it
-    count    parts so far
-    tools    what was taken as zero of tool lengths, in words
-    notes    what there is to say about them
-    lacking  what of them is not known
-    units    of length, so far
-    look     is shown each part
+    machine  as its file describes it; `set_up` is the same with the workpiece where the setup has it
+    count    number of parts so far
+    tools    names of the tool lengths that were taken as zero
+    notes    messages about tool lengths, by code and text
+    lacking  messages about tool lengths that must be given, by text
+    units    units of length so far, mm
+    look     is called with each part
     """
 
     machine: Machine
@@ -263,7 +266,7 @@ class MachineParts(Parts):
 
     @classmethod
     def of(cls, task: Task, read: Read) -> MachineParts:
-        """The parts of a program that is read."""
+        """The parts of the program whose text `read` returns."""
         return cls(
             task.options,
             PartReader(task.path, task.dialect, task.head),
@@ -278,22 +281,22 @@ class MachineParts(Parts):
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """What was taken as zero so far, in words."""
+        """The names of all values that were taken as zero so far."""
         return tuple(dict.fromkeys((*self.follower.assumed, *self.tools)))
 
     @property
     def messages(self) -> tuple[Message, ...]:
-        """What there is to say of following the program, so far."""
+        """The messages from following the program so far."""
         return (*self.follower.messages, *self.notes.values())
 
     def __iter__(self) -> Iterator[ContinuedPart]:
-        """The parts; none any more once something is lacking.
+        """The parts, each with the motion before it. Once a value is lacking, no further part is yielded.
 
-        Raises what reading and following do, and at last UsageError for what the setup does not give.
+        Raises what reading and following raise and, at the end, UsageError for everything that the setup does not give.
         """
         head, direction = None, np.zeros(len(self.machine.axes), dtype=np.int8)
-        for found in self.parts():
-            part = replace(found, moves=self._known(found))
+        for raw in self.parts():
+            part = replace(raw, moves=self._known(raw))
             if self.follower.lacking or self.lacking:
                 continue
             if self.look is not None:
@@ -311,19 +314,19 @@ class MachineParts(Parts):
             raise UsageError.collected(missing)
 
     def _known(self, part: Part) -> Moves:
-        """The motions of a part with every tool length known; notes what is lacking."""
+        """The motions of a part with every tool length known. Lengths that must be given are noted in `lacking`."""
         try:
-            found = with_tool_lengths(part.program, Trace(part.moves), self.machine, self.setup)
+            trace = with_tool_lengths(part.program, Trace(part.moves), self.machine, self.setup)
         except UsageError as error:
             self.lacking |= {message.text: message for message in error.messages if message.text not in self.lacking}
             return part.moves
-        for name, message in zip(found.assumed, found.messages, strict=True):
+        for name, message in zip(trace.assumed, trace.messages, strict=True):
             self.tools.setdefault(name, name)
             self.notes.setdefault((message.code, message.text), message)
-        return found.moves
+        return trace.moves
 
     def _head(self, continued: ContinuedPart) -> tuple[Part, Signs]:
-        """The last motion with its block, and the way in which the axes came there."""
+        """The last motion of a part with its block, and the direction in which each axis came to its start."""
         part, direction = continued.part, continued.direction
         head = Part(*last_of(part.program, part.moves), False)
         if self.sided:
@@ -334,7 +337,7 @@ class MachineParts(Parts):
 
 @frozen
 class Attempt:
-    """A text of a part that did not mean what was planned, its motions, and the rounds of its plan."""
+    """A first attempt at a part whose text does not mean what was planned: the text, its motions, the plan's rounds."""
 
     text: bytes
     again: Moves
@@ -342,7 +345,11 @@ class Attempt:
 
 
 def misread_pieces(solution: WrittenPlan, again: Moves, own: Mask | None = None) -> Index:
-    """The pieces that mean something else in a text than was planned; `own` (m,): those that stand in it."""
+    """The numbers of the pieces that the control would understand otherwise than planned.
+
+    again  the motions of the text that was written
+    own    (m,) the pieces that stand in this text; None: all
+    """
     try:
         wrong = np.flatnonzero(differences(solution, again, own))
     except SelfCheckError as error:
@@ -351,7 +358,10 @@ def misread_pieces(solution: WrittenPlan, again: Moves, own: Mask | None = None)
 
 
 def reading_of(solution: WrittenPlan, again: Moves, head: Part | None) -> SecondReading:
-    """What a part that was written means, a row for each of its motions; `head`: the first, of which it has no text."""
+    """The control's reading of a part that was written, one row for each motion.
+
+    head  the motion before the part, if there is one: it is the first row, and its text belongs to the part before
+    """
     pieces = solution.plan.pieces
     if head is None:
         return SecondReading.of(again, pieces)
@@ -368,7 +378,7 @@ def reading_of(solution: WrittenPlan, again: Moves, head: Part | None) -> Second
 
 
 class PartProof:
-    """The proof of the parts of a program, one after the other: goes along what has been written so far."""
+    """The proof of the parts of a program: reads and follows the corrected text, part after part."""
 
     def __init__(self, task: Task, reader: PartReader) -> None:
         self.again, self.follower = PartReader(task.path, task.dialect, task.head), task.follower()
@@ -376,7 +386,7 @@ class PartProof:
         self.misread: Attempt | None = None
 
     def pass_over(self, continued: ContinuedPart, skipped: bool) -> None:
-        """Go past a part of another process, as programmed; `skipped`: so was the one before."""
+        """Follow a part of another process as programmed; `skipped`: the part before belonged to another one, too."""
         part = continued.part
         if continued.head is not None and not skipped:
             self.follower.stand(continued.head.moves.end[-1])
@@ -389,8 +399,9 @@ class PartProof:
     def misreadings(self, continued: ContinuedPart, joint: JointPlan, text: bytes) -> Readings | None:
         """See `driver.Proof.misreadings`.
 
-        A motion that is left as it was may end where the one before it has moved it. It is planned once more, with what
-        has been read; the text has to come out the same, for the control goes along it only once.
+        A motion that is left unchanged may end elsewhere because a motion before it was corrected. Then the part is
+        planned once more with this reading. The text must come out the same, because the follower has passed it already
+        and cannot go back.
         """
         (solution,), head, misread = joint.plans, continued.head, self.misread
         own = None if head is None else solution.plan.pieces.move > 0
@@ -411,12 +422,15 @@ class PartProof:
         return [reading_of(solution, again, head)]
 
     def check(self, part: Part, solution: WrittenPlan, text: bytes, edits: Splices) -> None:
-        """Raise what `misreadings` does for a part of plain motions; `edits` make the text from the part's."""
+        """Prove a part of plain motions: raise `NotInPartsError` if its text means anything else than was planned.
+
+        edits  the edits that make `text` from the text of the part
+        """
         if misread_pieces(solution, self._followed(part, text, edits)).size:
             raise NotInPartsError(FRAMES)
 
     def _followed(self, part: Part, text: bytes, edits: Splices | None) -> Moves:
-        """The motions of a text; `edits` make it from the part's, if known."""
+        """The motions of a corrected text; `edits` are those that make it from the text of the part, if known."""
         if edits is not None and core.engaged() and not left_alone(part.program.source, edits, text):
             raise SelfCheckError("more of the text has changed than was written anew")
         try:

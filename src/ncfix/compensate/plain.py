@@ -1,15 +1,16 @@
-"""Parts of plain straight motions, which is what long programs are made of: planned and written in few passes.
+"""The fast plan for parts of plain straight motions, of which long programs consist.
 
-The plan is that of `path` and `solve` without what such a part cannot need: it has no cycles, no axes without words and
-nothing that is refused, tool-centre-point control (TCP) is on in all of it or nowhere, and each motion begins where the
-one before ended. What needs more, or comes near to a limit, goes the long way. Both write the same bytes, tests say.
+It is the plan of `path` and `solve` without the cases that such a part does not have: it has no cycles, no axes without
+words and no refusals, tool-centre-point control (TCP) is on in all of it or nowhere, and each motion begins where the
+one before ended. A part that needs more, or comes near a limit, is planned by the full plan. Both plans write the same
+bytes; tests check this.
 
-With TCP X Y Z of a command are the tip's. The linear axes follow it, and not straight: a bound of how far they stray
-tells whether they may leave their travel on the way.
+Under TCP, X Y Z of a command are those of the tip, and the linear axes do not move straight. A bound of their deviation
+from a straight line tells whether they may leave their travel on the way.
 
-Most of the few arcs, dwells and turns of rotary axes among plain motions are planned with these: an arc that stays
-one, a dwell between motions that end where they shall, a turn. The others are planned the long way, each as a short
-program with the motion before it and the one behind it.
+Most of the few arcs, dwells and turns of rotary axes among plain motions are planned together with these: arcs that
+stay arcs, dwells where the axes stand as planned, turns. The others are planned by the full plan, each as a short
+program with the motion before it and the motion behind it.
 """
 
 from __future__ import annotations
@@ -50,13 +51,13 @@ from ncfix.writer.pieces import Pieces
 
 @frozen
 class MotionEnds:
-    """Axis positions and commands at the ends of motions that go on from each other, (n + 1, n_axes) each.
+    """Axis positions and commands at the ends of n consecutive motions.
 
-    machine      with the workpiece in its place
+    machine      the machine with the workpiece at its place
     tool_length  mm
-    tcp          under TCP
-    commands     of the program
-    meant        axis positions of the program
+    tcp          whether tool-centre-point control is on
+    commands     (n + 1, n_axes) programmed commands
+    meant        (n + 1, n_axes) programmed axis positions
     """
 
     machine: Machine
@@ -67,27 +68,27 @@ class MotionEnds:
 
     @classmethod
     def of(cls, machine: Machine, tool_length: float, commands: Array, tcp: bool) -> MotionEnds | None:
-        """From the commands of a program; None where axes under TCP may not reach every point, or stray by no bound."""
+        """From programmed commands; None if, under TCP, a point may be out of reach or the path has no known bound."""
         if tcp and not (moves_as_one(machine) and skew(machine) is not None):
             return None
         ends = cls(machine, tool_length, tcp, commands, commands)
         return replace(ends, meant=ends.joints(commands)) if tcp else ends
 
     def joints(self, commands: Array) -> Array:
-        """The axis positions that follow from commands (k, n_axes)."""
+        """(k, n_axes) axis positions that follow from commands (k, n_axes)."""
         return reached_joints(self.machine, commands, np.full(len(commands), self.tcp), self.tool_length)[0]
 
     def corrected(self, done: Array) -> Array:
-        """The commands that lead to corrected axis positions, (n + 1, n_axes)."""
+        """(n + 1, n_axes) commands that lead to the corrected axis positions `done` (n + 1, n_axes)."""
         if not self.tcp:
             return done
         tcp = np.ones(len(done), dtype=bool)
         return commands_of_positions(self.machine, self.commands, (self.meant, done), tcp, self.tool_length)
 
     def accelerations(self, segments: Segments, begin: Array, end: Array) -> Array:
-        """What no linear axis exceeds along motions under TCP, (k,) mm per motion squared, see `segments`.
+        """(k,) bound of the acceleration of any linear axis along motions under TCP, mm per motion squared.
 
-        begin, end  (k, n_axes) axis positions there
+        begin, end  (k, n_axes) axis positions at the ends of the motions
         """
         way = lengths((segments.end - segments.start) @ self.machine.at_zero[1])
         found = accelerations(self.machine, begin, end, self.tool_length, way)
@@ -95,7 +96,7 @@ class MotionEnds:
         return found
 
     def leave_travel(self, segments: Segments, begin: Array, end: Array, acceleration: Array) -> bool:
-        """Whether an axis leaves its travel along motions under TCP: looked at where it is not sure that none does."""
+        """Whether an axis leaves its travel along motions under TCP; motions that the bound leaves open are sampled."""
         rows = np.flatnonzero(~stays_within(self.machine, begin, end, acceleration))
 
         def joints(rows: Index, fraction: Array) -> Array:
@@ -104,17 +105,17 @@ class MotionEnds:
         return bool((excess(self.machine, joints, rows, np.ones(len(rows), dtype=bool)) > FUZZ).any())
 
 
-FEW = 16
-"""Of so many motions at most one may be other than plain."""
+MIN_MOTIONS_PER_ODD = 16
+"""Least number of motions for each one that is not plain; with fewer, the part is planned by the full plan."""
 
 
 @frozen
 class MorePieces:
-    """What is to be written of some motions.
+    """The pieces of some motions.
 
-    rows    (k,) which motions, in order
-    counts  (k,) how many pieces each has
-    pieces  these pieces
+    rows    (k,) the motions, in order
+    counts  (k,) number of pieces of each motion
+    pieces  the pieces of all of them
     """
 
     rows: Index
@@ -125,18 +126,18 @@ class MorePieces:
 def arcs_and_dwells(
     intent: Intent, real: Segments, plain: Mask, dialect: Dialect, rounding: float
 ) -> tuple[Segments, MorePieces] | None:
-    """Motions as they are really done, with the circles of the arcs among them, and these arcs and dwells.
+    """The corrected segments with the fitted circles of their arcs, and the pieces of the arcs and dwells.
 
-    real      where they really start and end
-    plain     (n,) those that are straight; of the others a turn is as one of them
-    rounding  how far a point may move when it is rounded to the control's digits, mm
+    real      the corrected starts and ends of the motions
+    plain     (n,) straight motions; turns of rotary axes are treated like them
+    rounding  largest shift of a point by rounding to the control's digits, mm
 
-    None if there are many arcs, or some that do not surely stay arcs within the travels.
+    None if there are many arcs, or some that may not stay arcs within the travels.
     """
     moves, arc = intent.moves, intent.segments.arc
     dwell, turn = moves.kind == MotionKind.DWELL, (moves.kind == MotionKind.FEED) & (moves.modal == 10)
     arcs, dwells = np.flatnonzero(arc), np.flatnonzero(dwell)
-    if FEW * len(arcs) > len(plain) or not (plain | arc | dwell | turn).all():
+    if MIN_MOTIONS_PER_ODD * len(arcs) > len(plain) or not (plain | arc | dwell | turn).all():
         return None
     if (real.start[dwells] != real.end[dwells]).any() or full_circles(intent, arcs).any():
         return None
@@ -157,9 +158,12 @@ def arcs_and_dwells(
 def by_the_long_way(
     machine: Machine, dialect: Dialect, options: FixOptions, moves: Moves, plain: Mask
 ) -> MorePieces | None:
-    """The motions that are not `plain` (n,), and those behind them; None if more has to be said of them than that."""
+    """The pieces of the motions that are not `plain` (n,), and of the motion behind each, by the full plan.
+
+    None if there are many, or if one is refused or has a finding: then the whole part needs the full plan.
+    """
     odd = np.flatnonzero(~plain)
-    if FEW * len(odd) > len(moves) or odd[0] == 0 or odd[-1] + 2 >= len(moves):
+    if MIN_MOTIONS_PER_ODD * len(odd) > len(moves) or odd[0] == 0 or odd[-1] + 2 >= len(moves):
         return None
     near = distinct(np.concatenate([odd - 1, odd, odd + 1]))
     few = taken(moves, near)
@@ -174,9 +178,9 @@ def by_the_long_way(
 
 
 SplitChoice = tuple[Index, Split | None, tuple[Finding, ...]]
-"""Motions that must be split, their pieces, and what there is to say; see `Planner._split`."""
+"""Motions that must be split, their pieces, and findings; see `Planner._split`."""
 NEARLY = 1 - 1e-6
-"""Of a limit; what comes so close to one is for the long way to judge."""
+"""Fraction of a limit above which the full plan has to judge."""
 
 
 @frozen
@@ -184,14 +188,14 @@ class PlainPlan:
     """The plan of a part of plain motions.
 
     part          its text and motions
-    plain         (n,) those that are plain: straight, and to be corrected; the few others are arcs and dwells
+    plain         (n,) straight motions that are corrected; the few others are arcs and dwells
     intent        the motions on the machine
-    real          where they really start and end, before rounding: there the tip is where it should be, to 1 nm
-    pieces        what is to be written
-    first         (n + 1,) the first piece of each motion, and how many there are
-    before        (n,) mm: how far off it is at their ends without a correction
-    findings      what there is to say of motions
-    behind_rapid  whether the motion before them is one
+    real          corrected starts and ends, before rounding; with them, the tip is right to 1 nm
+    pieces        the pieces to be written
+    first         (n + 1,) number of the first piece of each motion, and at last the number of pieces
+    before        (n,) tip error at the end of each motion without a correction, mm
+    findings      remarks about motions
+    behind_rapid  whether the motion before the part is a rapid
     """
 
     part: Part
@@ -211,19 +215,19 @@ class PlainPlan:
 
     @property
     def check_start(self) -> Mask:
-        """(n,) motions whose starts no figure of the one before shows: as `deviation.starts_to_check`."""
+        """(n,) motions whose start is not the end of a motion with a figure: as `deviation.starts_to_check`."""
         kind = self.part.moves.kind[:-1]
         return np.append(self.behind_rapid, (kind == MotionKind.DWELL) | (kind == MotionKind.RAPID))
 
     def written_plan(self, emission: Emission) -> WrittenPlan:
-        """The plan and its text as the long way has them."""
+        """The plan and its text in the form of the full plan."""
         moves = self.part.moves
         untold = np.zeros(len(moves)), np.ones(len(moves), dtype=bool)
         plan = Plan(self.pieces, self.real.start, *untold, self.findings)
         return WrittenPlan(self.intent, plan, emission, moves.kind == MotionKind.DWELL, {}, reaches_back=False)
 
     def last(self, of_pieces: Array) -> Array:
-        """Of what all pieces (m, k) have that of the last piece of each motion, (n, k)."""
+        """(n, k) of values (m, k) of all pieces, those of the last piece of each motion."""
         return of_pieces if self.single else picked(of_pieces, self.first[1:] - 1)
 
 
@@ -231,7 +235,7 @@ class PlainPlan:
 class Planner:
     """Plans parts of plain motions.
 
-    machine  with the workpiece in its place
+    machine  the machine with the workpiece at its place
     """
 
     machine: Machine
@@ -241,7 +245,7 @@ class Planner:
 
     @classmethod
     def of(cls, machine: Machine, options: FixOptions) -> Planner | None:
-        """For a machine and options; None if these need the long way, and where the core is not compiled."""
+        """The planner for a machine and options; None if these need the full plan, or the core is not compiled."""
         strategy = get_strategy(options.strategy)
         budget = PathTolerance(options.tolerance_mm, rounding(machine))
         able = strategy.follows_path and not strategy.corrects_orientation and budget.fine
@@ -258,7 +262,7 @@ class Planner:
         return cls(machine, options, strategy, required)
 
     def plan(self, continued: ContinuedPart) -> PlainPlan | None:
-        """The plan of a part behind the last motion of the one before; None if it needs the long way."""
+        """The plan of a part; None if the part needs the full plan."""
         part, moves = continued.part, continued.part.moves
         plain = None if continued.head is None else plain_ones(continued.head.moves, moves)
         if continued.head is None or plain is None or moves.beside is not None:
@@ -267,12 +271,12 @@ class Planner:
         poses = MotionEnds.of(self.machine, float(moves.tool_length[0]), commands, tcp)
         if poses is None:
             return None
-        found = self.strategy.solve(self.machine, poses.meant, State(poses.tool_length))
-        if found.before is None or not found.converged.all() or not self._within_limits(poses.meant, found.q):
+        solved = self.strategy.solve(self.machine, poses.meant, State(poses.tool_length))
+        if solved.before is None or not solved.converged.all() or not self._within_limits(poses.meant, solved.q):
             return None
-        intent, done = Intent(self.machine, moves, State()), poses.corrected(found.q)
-        real = replace(intent.segments, start=done[:-1], end=done[1:])
-        bound = self._bounds_of(poses, intent, real, found.q)
+        intent, corrected = Intent(self.machine, moves, State()), poses.corrected(solved.q)
+        real = replace(intent.segments, start=corrected[:-1], end=corrected[1:])
+        bound = self._bounds_of(poses, intent, real, solved.q)
         if bound is None:
             return None
         others, alone, looked = None, plain, None
@@ -290,13 +294,13 @@ class Planner:
         inner = np.flatnonzero((pieces.fraction < 1) & alone[pieces.move])
         if inner.size:
             pieces = on_digits(intent, pieces, inner)
-            if not self._fine_inside(poses, real, pieces, inner, found.q):
+            if not self._fine_inside(poses, real, pieces, inner, solved.q):
                 return None
         behind_rapid = bool(continued.head.moves.kind[-1] == MotionKind.RAPID)
-        return PlainPlan(part, plain, intent, real, pieces, first, found.before[1:], findings, behind_rapid)
+        return PlainPlan(part, plain, intent, real, pieces, first, solved.before[1:], findings, behind_rapid)
 
     def _bounds_of(self, poses: MotionEnds, intent: Intent, real: Segments, done: Array) -> Array | None:
-        """What the deviation of the tip does not exceed along motions, (n,) mm; None if one leaves a travel on its way.
+        """(n,) bound of the deviation of the tip along motions, mm; None if, under TCP, one leaves a travel on its way.
 
         done  (n + 1, n_axes) corrected axis positions
         """
@@ -317,9 +321,9 @@ class Planner:
     def _in_one_look(
         self, continued: ContinuedPart, intent: Intent, real: Segments, bound: Array, plain: Mask
     ) -> tuple[MorePieces, SplitChoice] | tuple[None, None]:
-        """The arcs and dwells among `plain` motions (n,), and which motions must be split, all looked at together.
+        """The pieces of arcs and dwells, and the motions that must be split, all examined together as in `_split`.
 
-        Nothing if these arcs need more than that; the others as `_split`.
+        plain  (n,) the straight motions. (None, None) if the arcs or dwells need the full plan.
         """
         moves, found = intent.moves, None
         if not moves.tcp[0]:
@@ -335,12 +339,13 @@ class Planner:
     def _split(
         self, intent: Intent, real: Segments, bound: Array, among: Mask, check_start: Mask | None = None
     ) -> SplitChoice:
-        """The motions `among` (n,) that must be split, and their pieces; None of them where some need the long way.
+        """The motions that must be split, their pieces, and findings about motions that must not be split.
 
-        bound        (n,) mm: what their deviation does not exceed
-        check_start  (n,) those that are looked at where they begin, too
+        bound        (n,) bound of their deviation, mm
+        among        (n,) the motions to examine
+        check_start  (n,) motions that are examined at their start, too
 
-        Also what there is to say of those that must not be split. An arc that would have to be needs the long way.
+        Motions without pieces (None) need the full plan; so does an arc that would have to be split.
         """
         moves, limit = intent.moves, self.required.budget.path
         rows = np.flatnonzero(~(bound <= SURE * limit) & among)
@@ -362,9 +367,9 @@ class Planner:
         return rows, parts if np.isfinite(parts.worst).all() else None, findings
 
     def _bounds(self, meant: Array, done: Array, tool_length: Array) -> Array:
-        """What the deviation of the tip does not exceed along motions from pose to pose, (n,) mm.
+        """(n,) bound of the deviation of the tip along motions from pose to pose, mm.
 
-        meant, done  (n + 1, n_axes) poses as programmed and as corrected
+        meant, done  (n + 1, n_axes) programmed and corrected axis positions
         """
         from ncfix.core import motions
 
@@ -378,11 +383,11 @@ class Planner:
 
     @property
     def _linear(self) -> Array:
-        """1 for linear axes, 0 for others: loops multiply by it faster than they ask."""
+        """(n_axes,) 1.0 for linear axes, 0.0 for rotary ones: the compiled loops multiply by it."""
         return np.where(self.machine.rotary, 0.0, 1.0)
 
     def _within_limits(self, meant: Array, done: Array) -> bool:
-        """Whether corrected poses, and those of the program, come near no limit: as `limits`. Arrays as for bounds."""
+        """Whether programmed and corrected poses keep clear of all limits of `limits`. Arrays as in `_bounds`."""
         from ncfix.core import motions
 
         low, high = self.machine.ranges.T
@@ -391,9 +396,9 @@ class Planner:
         return bool(motions.within_limits(meant, done, *axes, linear, NEARLY * JUMP, FUZZ))
 
     def _fine_inside(self, poses: MotionEnds, real: Segments, pieces: Pieces, inner: Index, done: Array) -> bool:
-        """Whether pieces that end inside of motions (k,) come near no limit.
+        """Whether pieces `inner` (k,), which end inside motions, keep clear of all limits.
 
-        done  (n + 1, n_axes) corrected poses between the motions
+        done  (n + 1, n_axes) corrected axis positions at the ends of the motions
         """
         near = distinct(np.concatenate([inner, inner + 1]))
         own, ends, fraction = pieces.move[near], pieces.end[near], pieces.fraction[near]
@@ -416,16 +421,16 @@ class Planner:
         return bool(lengths((change - before)[:, ~self.machine.rotary]).max(initial=0.0) <= NEARLY * JUMP)
 
     def _small(self, shift: Array) -> bool:
-        """Whether corrections (k, n_axes) are smaller than the machine allows."""
+        """Whether all corrections (k, n_axes) are smaller than the machine allows."""
         linear, rotary = self.machine.max_correction
         turns = np.abs(shift[:, self.machine.rotary]).max(initial=0.0) <= NEARLY * rotary
         return bool(turns and lengths(shift[:, ~self.machine.rotary]).max(initial=0.0) <= NEARLY * linear)
 
 
 def plain_ones(head: Moves, moves: Moves) -> Mask | None:
-    """(n,) which motions are plain: straight ones of one frame and one tool, all words of which say where to go.
+    """(n,) which motions are plain: straight, in one frame, with one tool, to absolute targets.
 
-    None unless all go on from each other, and from the last one before them, and the others are arcs and dwells.
+    None unless each motion starts where the one before it ended (`head` before the first), and all may be planned here.
     """
     tool, frame, tcp = moves.tool_length[0], moves.frame[0], moves.tcp[0]
     alike = (
@@ -442,7 +447,7 @@ def plain_ones(head: Moves, moves: Moves) -> Mask | None:
 
 
 def _may_be_planned(moves: Moves) -> bool:
-    """Whether motions are to be corrected, in the axes that they name, from where they begin to where they say."""
+    """Whether all motions are dwells, or are corrected from a known start to an absolute target."""
     rule = (moves.rule != Rule.CORRECT) & (moves.kind != MotionKind.DWELL)
     special = moves.incremental | rule | (moves.kind == MotionKind.CYCLE) | moves.beside_tip
     columns = moves.approach, moves.counted, moves.resting
@@ -453,7 +458,7 @@ def _may_be_planned(moves: Moves) -> bool:
 
 
 def _are_straight(moves: Moves) -> Mask:
-    """(n,) straight motions but those at feed that turn rotary axes alone."""
+    """(n,) straight motions, except feeds that turn rotary axes only."""
     rapid = (moves.kind == MotionKind.RAPID) & (moves.modal == 0)
     cut = (moves.kind == MotionKind.FEED) & (moves.modal == 10)
     straight: Mask = rapid | (cut & ~turns_alone(moves))
@@ -461,9 +466,11 @@ def _are_straight(moves: Moves) -> Mask:
 
 
 def pieces_of(real: Segments, over: Index, parts: Split | None, others: MorePieces | None) -> tuple[Pieces, Index]:
-    """The pieces of motions done as `real` has them, but for motions `over`, done in `parts`, and for `others`.
+    """The pieces of all motions, and (n + 1,) the number of the first piece of each, at last the number of pieces.
 
-    Also the first piece of each motion, and how many there are, (n + 1,).
+    real    corrected segments; a motion that is in none of the others is one piece
+    over    motions that are split into `parts`
+    others  the pieces of motions that are not plain
     """
     counts = np.ones(len(real), dtype=np.intp)
     if parts is not None:

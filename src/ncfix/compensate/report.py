@@ -1,4 +1,4 @@
-"""The report of a correction: what is said of a program is put together from its parts, of which there may be one."""
+"""The report of a correction: figures, refusals and warnings, added up over the parts of a program."""
 
 from __future__ import annotations
 
@@ -36,17 +36,17 @@ HAS_G93 = "check that the control has G93"
 STOPS = "this motion, and others under exact stop (G60, G61), are split: the control stops at the end of every piece"
 MARKS = "continuous path mode (G64) in the program, if a stop may leave marks"
 SEEN_UM = 0.001
-"""By no more figures differ that are of the same path: they are of places looked at, and of errors to a nanometre."""
+"""Difference, um, up to which two figures count as equal: they are taken at sample points and computed to 1 nm."""
 
 
 WRITTEN_FLAT = "NCF445"
 NOTHING_SEEN: Mapping[str, None] = {"max": None, "rms": None}
-"""The figures where nothing was looked at."""
+"""The figures of a program in which no place was examined."""
 
 
 @frozen
 class Refusal:
-    """A motion block that was left as it was although it is not right, and why."""
+    """A motion block that was refused, that is, left uncorrected although it needs a correction, and why."""
 
     line: int
     code: str
@@ -59,16 +59,16 @@ class Refusal:
 
 @frozen
 class FixReport:
-    """What was done to one program, as figures.
+    """The report of the correction of one program.
 
-    error_before_um, error_after_um  tip error along the path: "max" and "rms" in um, and "where" (line) after; None
-            where nothing was looked at
-    max_correction_um  None where nothing was corrected
-    rounding_um  what the control's digits may add to the path that was planned
-    left    axes that had to stay where they stand, since the program has not said where that is
-    block_delete  the positions of block delete for which it is right: the switches that are on in each
-    passed_by_rule  blocks that were passed, by rule
-    no_figure  motions at feed and holes of which the figures say nothing, by reason
+    error_before_um, error_after_um  tip error along the path: "max" and "rms" in um, after also "where" (line); None
+            if no place was examined, empty without `verify`
+    max_correction_um  largest shift of a linear command; None if nothing was corrected
+    rounding_um  largest deviation that the control's digits may add to the planned path
+    left    axes that got no word although a correction needed one, and so were left where they stand
+    block_delete  the positions of block delete for which the program is right: the switches that are on in each
+    passed_by_rule  number of blocks that were passed, by rule
+    no_figure  number of feeds, arcs and holes that the figures leave out, by reason
     """
 
     path: str
@@ -93,7 +93,7 @@ class FixReport:
 
     @property
     def refusals(self) -> list[Message]:
-        """What was refused, as messages."""
+        """The refused blocks, as messages."""
         return [Message(each.code, each.reason, Place(self.path, each.line)) for each in self.refused]
 
     def as_dict(self) -> dict[str, object]:
@@ -122,9 +122,9 @@ class FixReport:
         }
 
     def with_what_is_left(self, tolerance_um: float) -> FixReport:
-        """The report with a warning if more is left at the tool tip than tolerance and rounding allow (NCF416).
+        """The report with warnings about the tip error that is left.
 
-        And with one if more is left than there was (NCF418).
+        NCF416: it exceeds tolerance and rounding. NCF418: it is larger than without the correction, both max and rms.
         """
         left, line, found = self.error_after_um.get("max"), self.error_after_um.get("where"), list[Message]()
         if left is None:
@@ -153,20 +153,24 @@ class FixReport:
 
 @mutable
 class Side:
-    """Tip errors on one side of the correction: largest, its line, sum of squares times way."""
+    """Tip errors before, or after, the correction.
+
+    max      largest, mm, at `line`
+    squares  mean square times length of path, mm^3
+    """
 
     max: float = 0.0
     line: int | None = None
     squares: float = 0.0
 
     def take(self, other: Side) -> None:
-        """Take in what comes behind."""
+        """Add the tip errors of a later part."""
         self.squares += other.squares
         if other.max > self.max:
             self.max, self.line = other.max, other.line
 
     def as_dict(self, way: float, samples: int) -> dict[str, float | int | None]:
-        """The figures, um, of so many places that were looked at."""
+        """The figures "max" and "rms", um; None without samples. `way`: length of the path, mm."""
         if not samples:
             return dict(NOTHING_SEEN)
         rms = math.sqrt(self.squares / way) if way else 0.0
@@ -174,11 +178,11 @@ class Side:
 
 
 SUMS = ("blocks", "moves", "compensated", "passed", "unseen", "samples", "inserted", "way", "refused")
-"""What of a tally is added up."""
+"""The fields of a tally that are summed over the parts."""
 
 
 def as_written(solution: WrittenPlan) -> Iterator[Finding]:
-    """The turns that get inverse time, and pieces at whose ends the control stops."""
+    """Findings about the text: turns that are written with inverse time, and split motions under exact stop."""
     if timed := solution.emission.timed:
         yield Finding.of("NCF456", np.array(timed, dtype=np.intp), TIMED, HAS_G93)
     stops, pieces = solution.moves.exact_stop, solution.plan.pieces
@@ -188,13 +192,14 @@ def as_written(solution: WrittenPlan) -> Iterator[Finding]:
 
 @mutable
 class Tally:
-    """What has been done to the parts so far.
+    """The figures of the parts that have been corrected so far.
 
-    step     of the control's digits, mm
-    rounding what these add to the path at most, mm
-    passed   blocks, by rule; `unseen`: motions that have no figure, by reason
-    samples  places that were looked at
-    numbers  those in the first lines, by which a program is known that was corrected before
+    step      least increment of the control, mm
+    passed    number of passed blocks, by rule; `unseen`: number of motions without a figure, by reason
+    samples   number of places at which the path was examined; `way`: its length, mm
+    largest   largest shift of a linear command, mm
+    rounding  largest deviation that the control's digits add to the path, mm
+    numbers   the commands in the first lines, which tell whether the program was corrected before
     """
 
     step: float
@@ -218,7 +223,7 @@ class Tally:
     numbers: Numbers = field(default_factory=dict)
 
     def add(self, program: Program, joint: JointPlan, own: Mask | None, machine: Machine) -> None:
-        """Take in a part, in all positions of block delete; of its motions those that are `own` (n,), if given."""
+        """Add a part, in all positions of block delete; `own` (n,): the motions to count, None: all."""
         every, steps = joint.plans, increments(machine)
         lacking = [each.lacking(steps, own) for each in every]
         left = [left_where_they_stand(program, each.moves, lack) for each, lack in zip(every, lacking, strict=True)]
@@ -246,9 +251,9 @@ class Tally:
         self._look_at_numbers(program, every[0], True if own is None else own)
 
     def add_plain(self, program: Program, solution: WrittenPlan, largest: float, intent: Intent) -> None:
-        """Take in a part of dwells and motions that were corrected, each in a block of its own.
+        """Add a part of dwells and corrected motions, each in a block of its own.
 
-        largest  shift of a linear command, mm
+        largest  largest shift of a linear command, mm
         """
         self.rounding = max(self.rounding, rounding_along(intent, solution.plan.pieces, solution.plan.corners))
         self.moves += len(solution.moves)
@@ -261,13 +266,13 @@ class Tally:
             self.found.add(finding, program, solution.moves)
 
     def _look_at_numbers(self, program: Program, solution: WrittenPlan, own: Mask | bool = True) -> None:
-        """Note the numbers in the first lines of a program; `own` (n,) motions of the part."""
+        """Note the commands in the first lines of the program; `own` (n,): the motions of this part."""
         if program.first_line <= LOOKED:
             among = ~solution.unchanged & own & (program.lines(solution.moves.block) <= LOOKED)
             self.numbers = numbers_of(solution.moves, solution.shift, among, self.step)
 
     def take(self, other: Tally) -> None:
-        """Take in what has been done to the part that comes next."""
+        """Add the tally of the next part."""
         for name in SUMS:
             total = getattr(self, name)
             total += getattr(other, name)
@@ -284,7 +289,10 @@ class Tally:
             self.numbers = numbers_together(self.numbers, other.numbers, self.step)
 
     def figures(self, program: Program, errors: Sequence[tuple[Moves, PathError]]) -> list[int | None]:
-        """Take in the tip errors of a part in each position of block delete; the lines of the largest ones after."""
+        """Add the tip errors of a part in each position of block delete.
+
+        Returns the line of the largest error after the correction in each position; None if no motion has one.
+        """
         way = max(each.way for _, each in errors)
         self.way += way
         self.samples += max(each.samples for _, each in errors)
@@ -298,7 +306,7 @@ class Tally:
         return lines
 
     def report(self, path: str, messages: tuple[Message, ...], options: FixOptions) -> FixReport:
-        """The report; `messages` are those of following the program."""
+        """The report. `messages`: the messages from following the program."""
         figures = options.verify
         after = self.after.as_dict(self.way, self.samples) | {"where": self.after.line}
         still = [] if self.moves else [each for each in messages if each.code == NEVER]
@@ -335,7 +343,7 @@ class Tally:
 
 
 def refusals(program: Program, account: Account) -> list[Refusal]:
-    """What was refused, by line."""
+    """The refused blocks, in the order of their lines."""
     blocks = sorted(account.refused)
     lines = program.lines(np.array(blocks, dtype=np.int64)).tolist()
     reasons = [account.refused[block] for block in blocks]
@@ -347,7 +355,7 @@ def refusals(program: Program, account: Account) -> list[Refusal]:
 
 
 def in_lines(report: FixReport, flat: Flat, program: Program) -> FixReport:
-    """The report of a flat program with the lines of the original."""
+    """The report of a flat program, with the lines of the original."""
 
     def with_lines(message: Message) -> Message:
         place = message.place

@@ -1,15 +1,14 @@
-"""Plan and text made consistent: what cannot be written stays as it was, and then the rest is planned anew.
+"""Plan and text made consistent: a motion that cannot be written stays unchanged, and the rest is planned anew.
 
-A block that is executed from several states may need another correction each time; a refused arc must begin where it
-began. Both show only when the text is written, and both change what the other motions have to do. So plan and emitter
-take turns until no further motion has to stay unchanged. Motions are only ever added to those that do, so this ends: a
-fixed point.
+A block that is executed from several states may need a different correction each time; a refused arc must begin where
+it began. Both show only when the text is written, and both change what the other motions have to do. So plan and
+emitter take turns until no further motion has to stay unchanged. The set of unchanged motions only grows, so this ends
+at a fixed point.
 
-A part of a program goes through the same rounds as the part before it, with what that one left in each
-(`PrecedingMotion`): what has to be left shows by and by, and motions behind it are planned before that, too. So a part
-refuses what the whole program would, and no less.
+A part of a program goes through the same rounds as the part before it, each with the state of the preceding motion in
+that round (`PrecedingMotion`). So a part refuses exactly the motions that would be refused in the whole program.
 
-What was written is read again. The new text must say what the plan meant (`differences`).
+The text that was written is read again, and must say what the plan meant (`differences`).
 """
 
 from __future__ import annotations
@@ -45,10 +44,10 @@ from ncfix.writer.pieces import BEYOND_TRAVEL, PINNED, SecondReading, closure_of
 
 @frozen
 class Round:
-    """The last motion of a part in one round: the plans that are made until nothing speaks against one, and its text.
+    """The last motion of a part in one round: k plans until one satisfies all limits, and then the text.
 
-    unchanged  (k,) in each plan, whether that motion is left as it was
-    shift      (k, n_axes) how far off the axes stand at its start then, mm and rad
+    unchanged  (k,) whether the motion is left unchanged in each plan
+    shift      (k, n_axes) offset of the axes from their programmed position at its start in each plan, mm and rad
     position   (n_axes,) the command at its end, as written
     """
 
@@ -57,13 +56,13 @@ class Round:
     position: Array
 
     def shortened(self) -> Round:
-        """Without plans that only repeat the one before."""
+        """The round without the plans at its end that repeat the one before."""
         changes = (self.unchanged[1:] != self.unchanged[:-1]) | (self.shift[1:] != self.shift[:-1]).any(axis=1)
         count = int(np.flatnonzero(np.append(True, changes))[-1]) + 1
         return Round(self.unchanged[:count], self.shift[:count], self.position)
 
     def is_repeated_by(self, other: Round) -> bool:
-        """Whether another round, behind this one, only repeats its end."""
+        """Whether the next round, `other`, only repeats the end of this one."""
         return (
             len(other.unchanged) == 1
             and np.array_equal(other.unchanged, self.unchanged[-1:])
@@ -73,7 +72,7 @@ class Round:
 
 
 def same_rounds(one: tuple[Round, ...], other: tuple[Round, ...]) -> bool:
-    """Whether a motion was the same in all rounds, to the last bit."""
+    """Whether two sequences of rounds are equal, to the last bit."""
     first, second = (
         [(each.unchanged.tobytes(), each.shift.tobytes(), each.position.tobytes()) for each in rounds]
         for rounds in (one, other)
@@ -83,10 +82,10 @@ def same_rounds(one: tuple[Round, ...], other: tuple[Round, ...]) -> bool:
 
 @frozen
 class PrecedingMotion:
-    """The last motion of the part before, with which a part begins once more.
+    """The last motion of the part before, which is also the first motion of a part.
 
-    rounds     in each round, see there; behind the last it stays as it is
-    direction  (n_axes,) in which the axes came to its start
+    rounds     its state in each round; in all later rounds it is as in the last one
+    direction  (n_axes,) the direction in which each axis came to its start
     """
 
     rounds: tuple[Round, ...]
@@ -94,12 +93,12 @@ class PrecedingMotion:
 
     @classmethod
     def steady(cls, shift: Array, direction: Signs, position: Array) -> PrecedingMotion:
-        """It was never left as it was; arrays (n_axes,) as in `Round`."""
+        """A motion that is corrected in the same way in all rounds; arrays (n_axes,) as in `Round`."""
         return cls((Round(np.zeros(1, dtype=bool), shift[None], position),), direction)
 
     @classmethod
     def of(cls, rounds: tuple[Round, ...], direction: Signs) -> PrecedingMotion:
-        """From all rounds of a part."""
+        """From all rounds of the part that it ends, without repetitions."""
         found: list[Round] = []
         for each in map(Round.shortened, rounds):
             if not found or not found[-1].is_repeated_by(each):
@@ -107,12 +106,12 @@ class PrecedingMotion:
         return cls(tuple(found), direction)
 
     def in_round(self, number: int) -> Round:
-        """What it was in a round, counted from 0."""
+        """Its state in round `number`, counted from 0."""
         return self.rounds[min(number, len(self.rounds) - 1)]
 
     @property
     def unchanged(self) -> bool:
-        """Whether it was left as it was in the end."""
+        """Whether it was left unchanged in the end."""
         return bool(self.rounds[-1].unchanged[-1])
 
     @property
@@ -138,11 +137,11 @@ class SelfCheckError(Exception):
 class WrittenPlan:
     """A plan that can be written, and its text.
 
-    intent     the motions on the machine
-    unchanged  (n,) those left as they were
-    reasons    block -> why it was refused
-    reaches_back  a refusal needs something before the first motion as it was
-    rounds     what the last motion was in each round that plan and emitter took
+    intent        the motions on the machine
+    unchanged     (n,) motions left as they were
+    reasons       block -> why it was refused
+    reaches_back  a refused motion requires that a motion before the first one stays unchanged, too
+    rounds        state of the last motion in each round of plan and emitter
     """
 
     intent: Intent
@@ -160,28 +159,29 @@ class WrittenPlan:
 
     @property
     def written(self) -> WrittenPieces:
-        """The pieces, with the numbers as the control will understand them."""
+        """The pieces, with ends and centres as the control will understand them."""
         emission = self.emission
         pieces = replace(self.plan.pieces, end=emission.end, centre=emission.centre)
         return WrittenPieces(self.intent, pieces, emission.start)
 
     def shown(self, rapids: bool) -> Mask:
-        """(n,) motions that figures are of: corrected ones that cut, and `rapids` if the tolerance holds along them.
+        """(n,) motions that the figures include: corrected motions that cut and, with `rapids`, corrected rapids.
 
-        Not those to a place that the machine measures itself: what it finds has its error in it.
+        Motions to a place that the machine has measured itself are left out, because that place contains its errors.
         """
         wanted = self.moves.cutting | (self.moves.kind == MotionKind.RAPID) if rapids else self.moves.cutting
         return wanted & ~self.unchanged & ~at_measured_places(self.moves)
 
     @property
     def shift(self) -> Array:
-        """(n, n_axes) by how much the command at the end of each motion is changed, as written, mm and rad."""
+        """(n, n_axes) written minus programmed command at the end of each motion, mm and rad."""
         return picked(self.emission.end, self.plan.pieces.last) - self.moves.end
 
     def lacking(self, steps: Array, own: Mask | None = None) -> Lacking | None:
-        """The axes that were left, of motions `own` (n,) if given; `steps` (n_axes,) what the control resolves.
+        """The axes that were left where they stand because they must get no word; None if no motion has such an axis.
 
-        None if there are none.
+        steps  (n_axes,) least increments of the control, mm and rad; half of one is no displacement
+        own    (n,) the motions to report; None: all
         """
         moves, known = self.moves, self.plan.known
         wordless = moves.wordless
@@ -198,13 +198,14 @@ class WrittenPlan:
 
 @frozen
 class AcceptedPlan:
-    """A plan that nothing speaks against but, perhaps, its text.
+    """A plan that satisfies all limits. Writing it may still fail.
 
-    planning   what it was made with
-    unchanged  (n,) motions left as they were
-    reasons    block -> why it was refused
-    reaches_back  a refusal needs something before the first motion as it was
-    history    in each plan on the way here, whether the last motion was left as it was, and how far off its start was
+    planning      the task from which it was made
+    unchanged     (n,) motions left as they were
+    reasons       block -> why it was refused
+    reaches_back  a refused motion requires that a motion before the first one stays unchanged, too
+    history       for each plan that led to this one: whether the last motion was left unchanged, and (n_axes,) the
+                  offset of the axes at its start, mm and rad
     """
 
     planning: Planning
@@ -215,14 +216,15 @@ class AcceptedPlan:
     history: tuple[tuple[bool, Array], ...]
 
     def round(self, position: Array) -> Round:
-        """What the last motion was, the end of which was written as a command `position` (n_axes,)."""
+        """The state of the last motion in this round; `position` (n_axes,): the command written for its end."""
         unchanged, shift = zip(*self.history, strict=True)
         return Round(np.array(unchanged), np.array(shift), position.copy())
 
     def anew(self, conflicts: Mapping[int, str], before: PrecedingMotion | None, number: int) -> AcceptedPlan:
-        """Plan anew, in a round with this number: what stays unchanged here does, and blocks whose text is in conflict.
+        """The plan of round `number`, in which blocks in conflict stay unchanged besides those that do so here.
 
         conflicts  block -> why it cannot be written
+        before     the last motion of the part before, if there is one
         """
         if conflicts and conflicts.keys() <= self.reasons.keys():
             raise AssertionError(f"blocks {sorted(conflicts)} are unchanged and yet in conflict")
@@ -233,12 +235,12 @@ class AcceptedPlan:
 
 @frozen
 class Planning:
-    """What the motions of a part are planned with, the same however often they are planned.
+    """The task of planning the motions of a part. It is the same in all rounds.
 
     intent    the motions on the machine
     strategy  finds the corrected commands
-    required   tolerance, and what the control accepts as an arc
-    held      the angle that the control may be told, see `WrittenLanguage.held_angle`; None: any
+    required  tolerances, and the arcs that the control accepts
+    held      rounds an angle to one that the program can state, see `WrittenLanguage.held_angle`; None: any angle
     """
 
     intent: Intent
@@ -256,10 +258,10 @@ class Planning:
         before: PrecedingMotion | None = None,
         source: bytes = b"",
     ) -> Planning:
-        """For motions of a program.
+        """The task for the motions of a program.
 
-        before  what an earlier part left: in which direction the axes have come to the start
-        source  the text of the program, for a strategy that corrects rotary axes
+        before  the last motion of the part before, of which only `direction` is used
+        source  the text of the program, which a strategy that corrects rotary axes needs
         """
         language = language_of(dialect, WrittenLanguage)
         tolerance = PathTolerance(options.tolerance_mm, rounding(machine))
@@ -271,20 +273,21 @@ class Planning:
         )
 
     def accepted(self, before: PrecedingMotion | None = None, refused: Mapping[int, Reason] = NONE) -> AcceptedPlan:
-        """Plan until nothing speaks against it.
+        """Plan until a plan satisfies all limits.
 
-        before   the last motion of the part before, where it is the first one here
-        refused  blocks that are refused in any case, and why
+        before   the last motion of the part before, if it is the first one here
+        refused  block -> why it is refused in any case
         """
         moves, head = self.intent.moves, None if before is None else before.in_round(0)
         unchanged = np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == MotionKind.DWELL))
         return self.settled(unchanged, {**refused, **_by_rule(moves)}, head)
 
     def settled(self, unchanged: Mask, reasons: Mapping[int, Reason], head: Round | None) -> AcceptedPlan:
-        """Plan until nothing speaks against it, where these motions (n,) and blocks stay unchanged from the beginning.
+        """Plan until a plan satisfies all limits; motions that violate one stay unchanged in the next plan.
 
-        `head` is what the first motion was, where it is the last one of the part before. Motions, and the `reasons` of
-        blocks, that have to stay besides are added.
+        unchanged  (n,) motions that stay unchanged from the beginning
+        reasons    block -> why it is refused, from the beginning
+        head       state of the first motion, if it is the last one of the part before
         """
         moves, history, bound = self.intent.moves, list[tuple[bool, Array]](), np.zeros(len(unchanged), dtype=bool)
         unchanged, reasons = unchanged.copy(), dict(reasons)
@@ -319,7 +322,11 @@ class Planning:
 
 
 def closure_of(dialect: Dialect, moves: Moves) -> Closure:
-    """What the control accepts as an arc; where 0.001 mm is 0.0001 inch its tolerance in inches goes by tenths, too."""
+    """The difference of start and end radius that the control accepts for an arc.
+
+    If the control's least increment of 0.001 mm becomes 0.0001 inch in inch programs, so does this tolerance in arcs
+    that are all in inches.
+    """
     frames = np.unique(moves.frame[moves.kind == MotionKind.ARC]).tolist() if dialect.decimal_inches else []
     inches = bool(frames) and all(moves.frames[frame].unit > 1.0 for frame in frames)
     return Closure(dialect.closure_mm * (INCH / 10 if inches else 1.0), dialect.closure_relative)
@@ -335,12 +342,12 @@ def plan_and_write(
     first: AcceptedPlan | None = None,
     refused: Mapping[int, Reason] = NONE,
 ) -> WrittenPlan:
-    """Plan and write until both agree.
+    """Plan and write in turns until a plan can be written.
 
-    reading  what the control made of an earlier attempt
-    before   what an earlier part of the program left, where this is a part: its last motion is the first one here
-    first    the plan to begin with, if that has been made already
-    refused  blocks that are refused whatever the plan is, and why
+    reading  the control's reading of an earlier attempt; None at the first
+    before   the last motion of the part before, which is the first one here; None for a whole program
+    first    the first plan, if it has been made already
+    refused  block -> why it is refused, whatever the plan is
     """
     if first is None:
         planning = Planning.of(moves, machine, program.dialect, options, before, program.source)
@@ -369,11 +376,12 @@ def plan_and_write(
 
 
 def _with_what_they_need(moves: Moves, unchanged: Mask, bound: Mask, reasons: dict[int, Reason]) -> tuple[Mask, bool]:
-    """All motions (n,) that have to be left as they were: those of refused blocks, and those that such ones begin from.
+    """(n,) all motions that have to stay unchanged, and whether a motion before the first one would have to, too.
 
-    bound  (n,) other motions that must begin where they began
+    These are `unchanged`, the motions of refused blocks, and the motions that lead to the start of one of them.
 
-    Also whether something before the first motion would have to be left, too. What is added goes into `reasons`.
+    bound    (n,) further motions that must begin where they are programmed to begin
+    reasons  block -> why it is refused; blocks of motions that are added here are added to it
     """
     while True:
         unchanged = unchanged | (np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS))
@@ -387,7 +395,7 @@ def _with_what_they_need(moves: Moves, unchanged: Mask, bound: Mask, reasons: di
 
 
 def increments(machine: Machine) -> Array:
-    """(n_axes,) what the control can resolve, mm and rad."""
+    """(n_axes,) the least increments of the control, mm and rad."""
     linear, rotary = machine.least_increment
     return np.where(machine.rotary, rotary, linear)
 
@@ -408,20 +416,22 @@ def _explain(reasons: dict[int, Reason], blocks: list[int], code: str, text: str
 
 
 SAME = 1e-6
-"""mm and rad; the emitter's book and a second reading differ by floating-point noise only."""
+"""Largest difference, mm or rad, between a written command and its second reading: floating-point noise only."""
 STRAY = 1.0
-"""mm and rad; more than earlier corrections can shift an unchanged motion (or `STRAYS` times the largest of them)."""
+"""Largest distance, mm or rad, by which earlier corrections may displace an unchanged motion; or `STRAYS` times the
+largest correction, if that is more."""
 STRAYS = 10.0
 TURN = 1.0
-"""rad; a corrected arc turns by what it did but for little, or else by a full turn more or less."""
+"""Largest change, rad, of the sweep of an arc. A correction changes it a little; a misread arc, by a full turn."""
 
 
 def differences(solution: WrittenPlan, again: Moves, own: Mask | None = None) -> Mask:
-    """Pieces that the control would understand otherwise than they were meant.
+    """(m,) whether the control would understand a piece otherwise than planned, of the pieces in the text.
 
-    own  (m,) pieces that stand in the text that was read; all if not given
+    again  the motions of the text that was written
+    own    (of all pieces) those that stand in this text; None: all
 
-    Raises `SelfCheckError` if their number differs.
+    Raises `SelfCheckError` if the text has another number of motions.
     """
     emission, pieces = solution.emission, solution.plan.pieces
     rows = np.arange(len(pieces)) if own is None else np.flatnonzero(own)
@@ -438,13 +448,13 @@ def differences(solution: WrittenPlan, again: Moves, own: Mask | None = None) ->
     off[np.isnan(again.centre[arcs]) & np.isnan(emission.centre[rows[arcs]])] = 0.0
     off = across(off, again.normal[arcs])  # the height of a centre means nothing
     differs[arcs[differ(off, np.zeros_like(off))]] = True
-    sweeps = solution.moves.sweep[pieces.move] * (pieces.fraction - pieces.begun)  # its share of what its motion does
+    sweeps = solution.moves.sweep[pieces.move] * (pieces.fraction - pieces.begun)  # the piece's share of its motion
     differs[arcs] |= np.abs(again.sweep[arcs] - sweeps[rows[arcs]]) > TURN
     return differs
 
 
 def _strayed(solution: WrittenPlan, again: Moves, rows: Index) -> Mask:
-    """Unchanged motions that the new text leads elsewhere, because what they rely on has changed."""
+    """Unchanged pieces that end far from where they were programmed to, because a state they rely on has changed."""
     pieces, ends = solution.plan.pieces, solution.moves.end
     if not pieces.unchanged.any():
         return np.zeros(len(rows), dtype=bool)
@@ -461,7 +471,7 @@ def _strayed(solution: WrittenPlan, again: Moves, rows: Index) -> Mask:
 
 
 def differ(found: Array, meant: Array) -> Mask:
-    """Rows of commands (m, n_axes) that are not the same but for noise."""
+    """(m,) whether two rows of commands (m, n_axes) differ by more than noise; NaN equals NaN."""
     with np.errstate(invalid="ignore"):
         off = found - meant
         same = np.asarray(np.abs(off, out=off) <= SAME)

@@ -1,19 +1,19 @@
-"""Several processes correct one program: each its own parts, and each knows what the others leave behind.
+"""Several processes that correct one program, each its own parts, and the messages between them.
 
-Process k of n corrects the parts k, n + k, 2n + k and so on. It reads the whole text, but of the parts between it only
-needs two things, which their processes send it:
+Process k of n corrects the parts k, n + k, 2n + k and so on. It reads the whole text; of the other parts it needs only
+two things, which their processes send:
 
-- `PartCheckpoint`: the state of the control behind a part, as soon as that has been followed. Where the state cannot be
-  sent, the others read and follow that part themselves;
-- `PrecedingMotion`: the last motion of a part as it was written, as soon as that is known. The process of the next part
-  can write then, while this one is still being proved.
+- `PartCheckpoint`: the state of the control behind a part, as soon as the part has been followed. If the state cannot
+  be sent, the other processes read and follow that part themselves.
+- `PrecedingMotion`: the last motion of a part as written, as soon as it is known. The process of the next part can then
+  write, while this part is still being proved.
 
-Corrected text is not sent: each process writes it into the output file, where it belongs (`OpenFiles`). The first
-process counts the parts, and reads the program for all of them if it comes through a pipe.
+Corrected text is not sent: each process writes it to its place in the output file (`OpenFiles`). The first process
+counts the parts; if the program comes through a pipe, it reads the pipe for all processes.
 
-Every two processes have a connection. When a process dies, its connections end, and whoever waits at one gets
-`WorkerGoneError`. When the first process leaves the work, for whatever reason, it ends all others; if it is killed,
-they end by themselves.
+Each pair of processes has a connection. When a process dies, its connections close, and a process that waits at one
+gets `WorkerGoneError`. When the first process leaves the work, for whatever reason, it ends all others; if it is
+killed, they end by themselves.
 """
 
 from __future__ import annotations
@@ -39,21 +39,21 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
     Connections = Mapping[tuple[int, int], Connection]
-    """The end of each connection that one process has to another: (one, other)."""
+    """(one, other) -> the end that process `one` has of its connection to process `other`."""
 
 
 class WorkerGoneError(Exception):
-    """A process that worked on the program has ended before its time."""
+    """A process that worked on the program has ended unexpectedly."""
 
 
 @mutable
 class Mailbox:
-    """The messages of one process to the others, and theirs to it.
+    """The messages that one process exchanges with the others.
 
-    process      its own number
-    connections  to the others, by their numbers
-    received     by the kind of a message and its number, mostly that of a part
-    unsent       on their way: a thread sends them, so that `send` never waits for the one who receives
+    process      the number of this process
+    connections  number of another process -> connection to it
+    received     (kind, number) -> message; the number is mostly that of a part
+    unsent       messages to be sent; a thread sends them, so that `send` never waits for the receiver
     """
 
     process: int = 0
@@ -62,7 +62,7 @@ class Mailbox:
     unsent: SimpleQueue[tuple[int, bytes] | None] = field(default_factory=SimpleQueue)
 
     def send(self, kind: str, number: int, what: Any, to: int | None = None) -> None:
-        """Send something to one process, or to all others. Raises here, not in the thread, if it cannot be pickled."""
+        """Send a message to one process, or to all others. Raises here, not in the thread, if it cannot be pickled."""
         if to == self.process:
             self.received[kind, number] = what
         elif self.connections:
@@ -71,7 +71,10 @@ class Mailbox:
                 self.unsent.put((each, data))
 
     def receive(self, seconds: float | None = None) -> bool:
-        """Take in what has come, or wait so long for something; whether there was any. Raises `WorkerGoneError`."""
+        """Take in messages that have arrived; without any, wait for one, at most `seconds` (None: without a limit).
+
+        Returns whether there was any. Raises `WorkerGoneError`.
+        """
         if not self.connections:
             assert seconds is not None, "no other process could send it"
             return False
@@ -94,7 +97,7 @@ class Mailbox:
 
     @contextmanager
     def sending(self, failed: Callable[[], object]) -> Iterator[Mailbox]:
-        """Run the thread that sends; it calls `failed` where it cannot, as for want of memory."""
+        """Run the thread that sends; it calls `failed` if it cannot send, for example for lack of memory."""
         sender = Thread(target=self._send, args=(failed,), daemon=True)
         sender.start()
         try:
@@ -115,7 +118,7 @@ class Mailbox:
 
 
 def connections_between(count: int, context: Any) -> Connections:
-    """Connections between so many processes."""
+    """A connection between each two of `count` processes."""
     connections = {}
     for one, other in combinations(range(count), 2):
         connections[one, other], connections[other, one] = context.Pipe()
@@ -132,13 +135,13 @@ def own_connections(connections: Connections, process: int) -> dict[int, Connect
 
 @frozen
 class PartCheckpoint:
-    """A part that left little behind: only its last block has still to be read and followed.
+    """The state behind a part of another process, of which only the last block has to be read and followed.
 
-    size     bytes of the part
-    begin    where its last block begins
-    lines    that end before that, and `blocks` that stand there
-    tcp      the tip was under control (TCP) somewhere in it
-    control  what the control was like there
+    size     number of bytes of the part
+    begin    byte at which its last block begins
+    lines    number of lines that end before that byte; `blocks`: number of blocks there
+    tcp      whether tool-centre-point control (TCP) was on anywhere in the part
+    control  state of the control at that byte
     """
 
     size: int
@@ -152,25 +155,25 @@ class PartCheckpoint:
 Result = TypeVar("Result")
 Made = TypeVar("Made", bound="PartResult", covariant=True)
 FORKS = hasattr(os, "fork") and sys.platform != "darwin"
-"""Whether a process can be forked: not with Windows, and not in safety with the libraries of macOS."""
+"""Whether processes can be forked: Windows cannot, and the libraries of macOS make it unsafe."""
 Read = Callable[[int], bytes]
-"""Gives the next so many bytes of a text, just as many but at its end."""
+"""Returns the next `size` bytes of a text; fewer only at its end."""
 
 
 class PartResult(Protocol):
-    """What has been done to a part."""
+    """The result for one part."""
 
     def written_into(self, file: int, at: int) -> Any:
-        """Put the text into a file, from a byte on; the result with how long it is instead of it."""
+        """Write the text into a file, from byte `at` on; returns the result with the length instead of the text."""
 
 
 @frozen
 class OpenFiles:
-    """Files that all processes have open.
+    """Descriptors of the files that all processes have open.
 
-    text   the one that is corrected, or what of it has been read so far
-    whole  all of it is there from the beginning
-    out    the one into which corrected text goes
+    text   the program, or as much of it as has been read so far
+    whole  whether all of the program is there from the beginning
+    out    the file into which corrected text is written
     """
 
     text: int
@@ -180,9 +183,9 @@ class OpenFiles:
 
 @mutable
 class WorkShare:
-    """The parts of a program that one process corrects: of every `jobs` parts one.
+    """The parts of a program that one process corrects: one of every `jobs` parts.
 
-    begin  bytes of the corrected text before the part that it works on
+    begin  byte of the corrected text at which the part in work begins
     """
 
     jobs: int = 1
@@ -190,19 +193,19 @@ class WorkShare:
     begin: int = 0
 
     def has(self, number: int) -> bool:
-        """Whether a part is its own."""
+        """Whether this process corrects part `number`."""
         return number % self.jobs == self.mailbox.process
 
     def shares(self, number: int) -> bool:
-        """Whether a part is its own, and others want to know of it."""
+        """Whether this process corrects part `number`, and there are other processes to be told of it."""
         return self.jobs > 1 and self.has(number)
 
     def announce(self, number: int, checkpoint: PartCheckpoint | None) -> None:
-        """Tell the others what an own part leaves in the control; None: they have to follow it themselves."""
+        """Send the state of the control behind an own part; None: the others have to follow the part themselves."""
         self.mailbox.send("checkpoint", number, checkpoint)
 
     def checkpoint(self, number: int) -> PartCheckpoint | None:
-        """What a part of another process leaves in the control; None: it has to be followed. Waits for it."""
+        """The state of the control behind a part of another process; None: it has to be followed here. Waits for it."""
         received, owner = self.mailbox.received, number % self.jobs
         received.pop(("checkpoint", number - 1), None)
         if self.has(number):
@@ -212,24 +215,24 @@ class WorkShare:
         return received.get(("checkpoint", number))
 
     def before(self, number: int) -> PrecedingMotion | None:
-        """What the part before that one has left, as soon as it is known; None for the first part.
+        """The last motion of the part before part `number`, waiting for it; None for the first part.
 
-        Raises what kept another process from finding it out.
+        Raises the error that kept another process from finding it.
         """
         if number == 0:
             return None
-        found: tuple[PrecedingMotion, int] | Exception = self.mailbox.wait_for("before", number)
-        if isinstance(found, Exception):
-            raise found
-        before, self.begin = found
+        message: tuple[PrecedingMotion, int] | Exception = self.mailbox.wait_for("before", number)
+        if isinstance(message, Exception):
+            raise message
+        before, self.begin = message
         return before
 
     def leave(self, number: int, before: PrecedingMotion, size: int) -> None:
-        """Hand on what an own part leaves, which has become a text of so many bytes."""
+        """Hand on the last motion of an own part, whose corrected text has `size` bytes."""
         self._hand_on(number, (before, self.begin + size))
 
     def fail(self, number: int, error: Exception) -> None:
-        """Let the others know why there is no more to come, from an own part on."""
+        """Tell the others by which error this process stops, from own part `number` on."""
         self.mailbox.send("done", number, error, 0)
         self._hand_on(number, error)
         self.mailbox.send("silent", self.mailbox.process, None)
@@ -240,7 +243,7 @@ class WorkShare:
 
 @mutable
 class ReadAhead:
-    """Reads a text in pieces of just the size that is wanted, and so many pieces ahead; the last one may be shorter."""
+    """Reads a text in pieces of exactly the wanted size (the last may be shorter), and `pieces` more of them ahead."""
 
     source: Read
     pieces: int = 0
@@ -259,11 +262,11 @@ class ReadAhead:
 
 @mutable
 class BackgroundReader:
-    """Reads a text beside the first process, from the file where it stands.
+    """Reads the text in a process other than the first, from the file that all have open.
 
-    file   that file
-    whole  all of it is there; if not, the first process tells how much is
-    known  so many bytes are, and `pieces` have been told of
+    file    descriptor of that file
+    whole   whether all of the text is there; if not, the first process announces each piece that it has read
+    known   number of bytes that are there; `pieces`: number of pieces announced so far
     """
 
     file: int
@@ -287,14 +290,14 @@ class Worker(Protocol[Made]):
     """Corrects the parts of a share."""
 
     def work(self, share: WorkShare) -> Iterator[tuple[int, Made]]:
-        """The number of each own part, and what has been done to it."""
+        """The number of each own part, and its result."""
 
 
 @mutable
 class WorkerPool(Generic[Result]):
-    """This process and those beside it, and what they have done.
+    """The processes that correct a program, seen from the first one, which collects their results in order.
 
-    given  how many parts have been given back
+    given  number of results returned so far
     """
 
     share: WorkShare
@@ -302,7 +305,10 @@ class WorkerPool(Generic[Result]):
     given: int = 0
 
     def spread(self, read: Read) -> Read:
-        """A way to read that lets the others know what is there, and so much ahead that they need not wait for it."""
+        """The reader for this process. It announces each piece to the others, and reads ahead so that they do not wait.
+
+        This is `read` itself if the others can read the whole file.
+        """
         if self.files is None or self.files.whole:
             return read
         pieces = 0
@@ -317,18 +323,18 @@ class WorkerPool(Generic[Result]):
         return ReadAhead(spreading, self.share.jobs - 1)
 
     def put(self, number: int, result: Result) -> None:
-        """Note what this process has done."""
+        """Store a result of this process."""
         self.share.mailbox.received["done", number] = result
 
     def ready(self) -> Iterator[Result]:
-        """What has been done, in order, as far as it is there."""
+        """The next results, in order, that are there without waiting."""
         while self.share.mailbox.receive(0):
             pass
         while ("done", self.given) in self.share.mailbox.received:
             yield self._next()
 
     def rest(self, count: int) -> Iterator[Result]:
-        """What is left of so many parts, in order; waits for it."""
+        """The remaining results of `count` parts, in order; waits for them."""
         while self.given < count:
             yield self._next()
 
@@ -344,10 +350,10 @@ class WorkerPool(Generic[Result]):
 def worker_pool(
     jobs: int, worker: Callable[[Read], Worker[Made]], files: OpenFiles | None
 ) -> Iterator[WorkerPool[Made]]:
-    """The processes that work on a program: `jobs` processes, of which this is one.
+    """Start `jobs - 1` further processes that work on a program together with this one, and end them at last.
 
-    worker  makes what corrects a text in another process
-    files   all that processes share; without them, and where processes cannot be forked, this one works alone
+    worker  makes the object that corrects a text in another process
+    files   the files that the processes share; without them, or where processes cannot be forked, this one works alone
     """
     if jobs <= 1 or files is None or not FORKS:
         yield WorkerPool(WorkShare())
@@ -382,7 +388,7 @@ def worker_pool(
 
 
 def _work(worker: Callable[[Read], Worker[Any]], files: OpenFiles, jobs: int, process: int, connections: Any) -> None:
-    """What another process does; it ends when the first one has all it needs, or is gone."""
+    """The body of another process. It ends when the first process has all results, or is gone."""
     tie()
     with (
         Mailbox(process, own_connections(connections, process)).sending(lambda: os._exit(1)) as mailbox,
@@ -402,7 +408,7 @@ def _work(worker: Callable[[Read], Worker[Any]], files: OpenFiles, jobs: int, pr
 
 
 def _portable(error: Exception) -> Exception:
-    """The error, or its text where it cannot go from one process to another."""
+    """The error; a RuntimeError with its text if it cannot be pickled."""
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:
