@@ -1,4 +1,4 @@
-"""From the parser's tree of one block to the template of its shape, and what a grammar cannot say of its words."""
+"""Builds the template of a block shape from the parser's tree, and checks rules that a grammar cannot express."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ if TYPE_CHECKING:
     Node = Branch | Token
 
 NUMBERS = frozenset({"NUMBER", "UNSIGNED"})
-"""The terminals whose text is a number of the block; every other digit belongs to its shape."""
+"""The terminals that are numbers of the block; any other digit belongs to its shape."""
 
 MAX_DEPTH = 150
-"""How deep expressions may be nested, or how many operators they may chain; a control allows less."""
+"""Largest nesting depth of an expression, and largest number of chained operators; controls allow less."""
 
 
 class TooDeepError(Exception):
-    """An expression is nested deeper than `MAX_DEPTH`; `position` is where, in the squeezed block."""
+    """An expression is nested deeper than `MAX_DEPTH`; `position`: where, in the squeezed block."""
 
     def __init__(self, position: int) -> None:
         super().__init__(position)
@@ -59,12 +59,12 @@ class TooDeepError(Exception):
 
 @frozen
 class Parsed:
-    """One block, understood.
+    """The result of parsing one block.
 
-    template  what its shape means
+    template  the meaning of its shape
     spans     start and stop of each number in the block
     values    the numbers
-    comment   where the comment that ends the block starts, -1 without one
+    comment   start of the comment that ends the block; -1 without one
     """
 
     template: Template
@@ -80,7 +80,7 @@ def build(
     maker: type[TreeBuilder] | None = None,
     keywords: Iterable[tuple[str, str]] = (),
 ) -> Parsed:
-    """Make the template of a block from its tree, by a language's own kind of builder; raises `TooDeepError`.
+    """The template of a block from its tree, made by the builder of its language; raises `TooDeepError`.
 
     keywords  see `Dialect.keywords`
     """
@@ -95,18 +95,18 @@ def build(
 
 
 def final_comment(tree: Branch) -> Token | None:
-    """The comment that ends the block, if one does."""
+    """The comment that ends the block; None without one."""
     last = tree.children[-1] if tree.children else None
     return last if last is not None and is_token(last) and kind(last) == "COMMENT" else None
 
 
 def is_token(node: Node) -> TypeIs[Token]:
-    """Whether a node is a terminal, which is text; Lark need not be loaded to see that."""
+    """Whether a node is a terminal. A terminal is a string, so Lark need not be imported for this."""
     return isinstance(node, str)
 
 
 def kind(node: Node) -> str:
-    """The name of a rule or terminal in its own grammar, without that of the grammar that it was imported from."""
+    """The name of a rule or terminal, without the prefix of the grammar it was imported from."""
     name = node.type if is_token(node) else str(node.data)
     return name.rpartition("__")[2]
 
@@ -124,11 +124,11 @@ def tokens_of(tree: Branch) -> Iterator[Token]:
 
 @frozen
 class TreeBuilder:
-    """Makes items of trees; knows where the numbers of the block stand.
+    """Builds items from trees; knows the places of the block's numbers.
 
     slots  edges of a number in the squeezed block -> its slot
-    stops  where each number stops in the block
-    keywords  what stands for a code or an address, and which
+    stops  where each number ends in the block
+    keywords  keyword -> the code or address that it stands for
     """
 
     text: str
@@ -140,20 +140,20 @@ class TreeBuilder:
     # -- places -------------------------------------------------------------------------------------------------------
 
     def anchor(self, place: int) -> Anchor:
-        """A place in the block, counted from the last number before it."""
+        """A place in the block, relative to the last number before it."""
         before = bisect_right(self.stops, place)
         return Anchor(before - 1, place - self.stops[before - 1]) if before else Anchor(START, place)
 
     def span(self, node: Node) -> Span:
-        """The stretch that a rule or terminal covers."""
+        """The span of a rule or terminal."""
         return self.between(*edges(node))
 
     def between(self, start: int, stop: int) -> Span:
-        """A stretch of the squeezed block."""
+        """The span of a range of the squeezed block."""
         return Span(*map(self.anchor, self.squeezed.span(start, stop)))
 
     def span_to_end(self, token: Token) -> Span:
-        """The stretch of the last terminal of a block: its length may differ from block to block."""
+        """The span of the last terminal of a block, whose length may differ from block to block."""
         start, stop = self.squeezed.span(*edges(token))
         return Span(self.anchor(start), Anchor(END, stop - len(self.text)))
 
@@ -181,7 +181,7 @@ class TreeBuilder:
         return makers[kind(node)](node)
 
     def terminal(self, token: Token) -> Item:
-        """An item that is a single terminal; one without a meaning of its own is opaque under its name."""
+        """An item that is a single terminal; one of unknown name becomes `Opaque` of that kind."""
         span = self.span(token)
         match kind(token):
             case "COMMENT":
@@ -203,7 +203,7 @@ class TreeBuilder:
         return Word(self.keywords.get(name, name), value, self.span(tree), self.span(node))
 
     def code(self, tree: Branch) -> Word:
-        """G or M with a plain number, which is part of the shape; or a keyword that stands for one."""
+        """A word of G or M with a plain number, which is part of the shape; or of a keyword that stands for one."""
         text = str(tree.children[0])
         start, stop = edges(tree)
         if meaning := self.keywords.get(text.upper()):
@@ -213,14 +213,14 @@ class TreeBuilder:
         )
 
     def assignment(self, tree: Branch) -> Assignment:
-        """A parameter that gets a value."""
+        """A parameter and the expression assigned to it."""
         target, value = tree.children
         parameter = self.expression(target)
         assert isinstance(parameter, NumberedParameter | NamedParameter)
         return Assignment(parameter, self.expression(value), self.span(tree))
 
     def flow(self, tree: Branch) -> OWordLine:
-        """A label, a keyword and its arguments; comments may stand between them."""
+        """A label, a keyword and its arguments; comments between them are ignored."""
         label, keyword, *arguments = tree.children
         values = tuple(self.expression(each) for each in arguments if kind(each) != "ARGUMENT_COMMENT")
         return OWordLine(self.label(label), str(keyword).lower(), values, self.span(tree))
@@ -242,7 +242,7 @@ class TreeBuilder:
     # -- expressions --------------------------------------------------------------------------------------------------
 
     def expression(self, node: Node, depth: int = 0) -> Expression:
-        """The expression that a tree, or the terminal of a number, stands for."""
+        """The expression of a tree or of a number terminal."""
         if is_token(node):
             return self.literal(node)
         if depth > MAX_DEPTH:
@@ -250,11 +250,11 @@ class TreeBuilder:
         return self.compound(node, depth + 1)
 
     def literal(self, token: Token) -> Literal:
-        """A number; other languages tell more of it apart."""
+        """A number; languages may distinguish more kinds."""
         return Literal(self.slots[edges(token)])
 
     def compound(self, tree: Branch, depth: int) -> Expression:
-        """The expression that a tree stands for."""
+        """The expression of a tree."""
         parts = tree.children
         match kind(tree):
             case "literal" | "bracket":
@@ -276,7 +276,7 @@ class TreeBuilder:
         raise AssertionError(f"the grammar has an expression {tree.data!r} that nobody builds")
 
     def binary(self, left: Node, operator: Node, right: Node, depth: int) -> Binary:
-        """Two operands and their operator; `ATAN[left]/[right]` is one, too."""
+        """An operator with two operands; also `ATAN[left]/[right]`."""
         return Binary(str(operator).lower(), self.expression(left, depth), self.expression(right, depth))
 
     def exists(self, node: Node, depth: int) -> Exists:
@@ -300,12 +300,12 @@ def name_of(node: Node) -> str:
 
 G_WITH_E = frozenset({470, 700, 760, 1870})
 M_WITH_E = frozenset({660, 670, 680})
-"""They take an E word, so that `H2E1` is two words there: G70, G76, M66, M67, M68 of LinuxCNC ("G codes", "M codes"),
-G47 and G187 of Haas."""
+"""G and M codes that take an E word, so that `H2E1` is two words: G70, G76, M66, M67, M68 of LinuxCNC ("G codes",
+"M codes"), G47 and G187 of Haas. In tenths."""
 
 
 def check_numbers(parsed: Parsed) -> None:
-    """Refuse a number that no double can hold."""
+    """Refuse a number that is too large for a double."""
     for (start, _), value in zip(parsed.spans, parsed.values, strict=True):
         if not isfinite(value):
             raise BlockError("NCF115", "the number is too large", start)
@@ -315,7 +315,7 @@ def check_numbers(parsed: Parsed) -> None:
 
 
 def check_exponents(parsed: Parsed, text: str) -> None:
-    """Refuse `X1e-5`: it would be read as X1 and a word E."""
+    """Refuse `X1e-5`, which would be read as X1 and a word E."""
     template = parsed.template
     if not (G_WITH_E.isdisjoint(template.g_codes) and M_WITH_E.isdisjoint(template.m_codes)):
         return
@@ -327,6 +327,6 @@ def check_exponents(parsed: Parsed, text: str) -> None:
 
 
 def start_of(word: Word, parsed: Parsed) -> int:
-    """Where a word starts in its block."""
+    """Start of a word in its block."""
     slot, offset = word.span.start
     return offset if slot < 0 else parsed.spans[slot][1] + offset

@@ -1,5 +1,5 @@
-"""A dialect as a small declarative table: which grammar, which words, which limits. Which dialects there are, which of
-them a text is written in, and whether bytes are an NC program at all.
+"""Dialects as small declarative tables: grammar, words, limits. Also: the list of dialects, detection of the dialect of
+a text, and whether bytes are an NC program at all.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ FAGOR = (
     rb"|IF[ \t]+P\d[^()\r\n]*[ \t](?:GOTO[ \t]+N|P?CALL[ \t]+|RPT[ \t]+N)\d[^()\r\n]*"
     rb"|SUB[ \t]*\d+(?=[ \t]*\)(?s:.*?)\([ \t]*RET[ \t]*\))|RET)[ \t]*\)"
 )
-"""Statements of Fagor controls: to all others they are comments, and the program is another one."""
+"""Statements of Fagor controls. Other controls read them as comments, which would make another program of the text."""
 
 FOREIGN: tuple[tuple[str, bytes], ...] = (
     ("Heidenhain Klartext", rb"(?im)^[ \t]*(?:\d+[ \t]*)?BEGIN[ \t]+PGM\b"),
@@ -54,10 +54,10 @@ FOREIGN: tuple[tuple[str, bytes], ...] = (
     ),
     ("Syntec code", rb"(?im)^[ \t]*(%[ \t]*@MACRO\b|[#@]\d+[ \t]*:=)"),
 )
-"""Other families of controls: what people call their language, and what shows it; for `Dialect.foreign`.
+"""Languages of other families, for `Dialect.foreign`: their common name, and a pattern that identifies them.
 
-With Okuma G54 to G59 are tool lengths, and G15 H selects work offsets. MAHO shifts the zero point by G93, and draws a
-window by G98 and G99. With NUM G52 is a motion in machine coordinates.
+On Okuma, G54 to G59 are tool lengths, and G15 H selects work offsets. MAHO shifts the zero point by G93, and draws a
+window by G98 and G99. On NUM, G52 is a motion in machine coordinates.
 """
 
 LATHE = "lathe code (X a diameter, U and W increments)"
@@ -74,22 +74,22 @@ TURNING: tuple[tuple[str, bytes], ...] = (
         rb"^[^(;\n]*(?<![A-Z])(T[ \t]*(?!0000)\d{4}(?![\d.]))(?=(?s:.*?)X[ \t]*[-+.\d#\[])",
     ),
 )
-"""What shows that a text of the Fanuc family is for a lathe: the spindle's limit (G50 S) or a place (G50 X), turning
-cycles that name the blocks of a contour (P and Q), or, in a text that names no Y, constant surface speed (G96), or a
-tool with its offset (T0101) and no M6."""
+"""Patterns that identify lathe programs of the Fanuc family: a spindle limit (G50 S) or a coordinate setting (G50 X),
+turning cycles with the blocks of a contour (P and Q), or, in a text without Y, constant surface speed (G96), or a tool
+with its offset (T0101) and no M6."""
 
 CODE = re.compile(r"[GM](0|[1-9]\d{0,3})(\.[1-9])?")
-"""How a code of a dialect's own is written."""
+"""Form of a dialect's own code."""
 KEYWORD, KEYWORD_MEANING = re.compile(r"[#$]?[A-Z][A-Z0-9_.]*"), re.compile(rf"{CODE.pattern}|[A-FH-LP-Z]")
-"""How a keyword is written, and what it may stand for: a code, or an address that takes a number."""
+"""Form of a keyword, and of its meaning: a code, or an address that takes a number."""
 FIXED = frozenset({"G0", "G1", "G2", "G3", "G17", "G18", "G19", "G20", "G21", "G53", "G80", "G90", "G91"})
-"""Codes whose meaning the reader and the writer rely on: no dialect may give them another."""
+"""Codes on whose meaning reader and writer rely: no dialect may redefine them."""
 
 COMMENT = re.compile(r"\([^(){}]*\{\}[^(){}]*\)|;[^{}\r\n]*\{\}[^{}\r\n]*")
-"""How the comments of the families may be written: their readers know `(...)` and `;`, whatever a grammar says."""
+"""Forms of comments allowed in the families: their readers know `(...)` and `;`, whatever the grammar."""
 
 HINTS = {LATHE: "lathe programs are followed where they say what X is: LinuxCNC (G7, G8), Siemens (DIAMON, DIAMOF)"}
-"""What helps with a language that is refused by name, where it is another thing than to name the dialect."""
+"""Hints for languages refused by name, where naming the dialect would not help."""
 
 
 def tenths(name: str) -> int:
@@ -98,34 +98,34 @@ def tenths(name: str) -> int:
 
 
 LEVELS = "EIJQR"
-"""Addresses that may give the level of a cycle: no code of the families has another use for them in its block."""
+"""Addresses that may give the level of a cycle: no code of the families uses them otherwise in its block."""
 REPEATS = "EKLP"
-"""Addresses that may say how often a cycle drills: their numbers are no lengths."""
+"""Addresses that may give the repeat count of a cycle: their numbers are no lengths."""
 NO_WORDS = "GMNO"
-"""Addresses of codes and of names of blocks and programs."""
+"""Addresses of codes, and of numbers of blocks and programs."""
 
 
 class CodeOperation(Protocol):
-    """Something that a code of a dialect's own does: the operations of `ncfix.control.operations`."""
+    """An action of a dialect's own code, see `ncfix.control.operations`."""
 
     takes: ClassVar[bool]
     alone: ClassVar[bool]
 
     def carry_out(self, control: Any, block: Any, destination: Any) -> None:
-        """Do it, before the motion of the block."""
+        """Execute it, before the motion of the block."""
 
 
 @frozen
 class CycleTable:
-    """A drilling cycle: from the level to the depth and back, at each hole that the words of the plane name.
+    """A drilling cycle: from the level to the depth and back, at each hole given by words of the plane.
 
     The depth is the word of the axis across the plane. It and the level count as in the family's cycles (G90, G91).
 
-    level    the address of the level from which it feeds
-    needs    addresses without which the control does not begin it
-    repeats  addresses that say how often it drills, of E K L P; empty: those of the family
+    level    address of the level from which it feeds
+    needs    addresses without which the control does not start it
+    repeats  addresses of the repeat count, among E K L P; empty: as in the family
     returns  where it ends: "mode" (as G98 and G99 say), "level", or "initial" (where the series of holes began)
-    modal    it stays in force until G80 or another motion code
+    modal    whether it stays in force until G80 or another motion code
     """
 
     level: str = "R"
@@ -153,56 +153,56 @@ class CycleTable:
         return f"drilling cycle, level {self.level}{needs}{count}, returns {ends}{once}"
 
     def ends_at_level(self, mode: bool) -> bool:
-        """Whether it ends at the level; `mode`: G99 is in force."""
+        """Whether it ends at the level; `mode`: whether G99 is in force."""
         return mode if self.returns == "mode" else self.returns == "level"
 
 
 FAMILY_CYCLE = CycleTable()
-"""A canned cycle that is the family's own: R is its level, and G98 and G99 say where it ends."""
+"""A canned cycle of the family itself: R is its level, and G98 and G99 define where it ends."""
 
 
 def is_letters(text: object, but: str = "") -> bool:
-    """Whether it is a string of capital letters, one at least, none of these."""
+    """Whether `text` is a non-empty string of capital letters, none of them in `but`."""
     return isinstance(text, str) and re.fullmatch("[A-Z]+", text) is not None and not {*text} & {*but}
 
 
 @frozen
 class Dialect:
-    """One control's language, as data; the grammar says what a block is, this says what the control makes of it.
+    """The language of one control, as data. The grammar defines what a block is, the dialect what it does.
 
     name                short name, as in `--dialect`
-    title               for people
+    title               name for people
     grammar             file name under `grammars/`, or the path of a plugin's own
     suffixes            file extensions that suggest it, lower case with the point
-    signature           regular expressions (bytes) in a file that suggest it, strongest first
-    variant_of          the dialect of which this is a variant: a text that shows that one, or another variant of it, is
-                        read as this where the machine has this control
-    foreign             languages that are refused by name: what people call them, and a regular expression (bytes)
-                        whose first group, if there is one, is what shows it
-    line_limit          characters a line may have, its end not counted; 0 = no limit
-    comment             how to write a one-line comment, with `{}` for the text
-    upper_case          comments are written in upper case: older controls know no other letters
-    block_numbers       of blocks that are put in, where every block has one: "same" as the block that they belong to,
-                        "none", or "renumber": all blocks anew
-    closure_mm          an arc whose start and end radii differ by more is refused by the control
-    closure_relative    the same relative to the radius (both must be exceeded)
+    signature           regular expressions (bytes) that suggest it if found in a file, strongest first
+    variant_of          the dialect of which this is a variant: a text that looks like that dialect, or like another
+                        variant of it, is read as this one if the machine has this control
+    foreign             languages that are refused by name: their common name, and a regular expression (bytes); its
+                        first group, if any, is the part that identifies the language
+    line_limit          largest number of characters of a line, without its end; 0: no limit
+    comment             form of a one-line comment, with `{}` for the text
+    upper_case          comments are written in upper case, because older controls know no other letters
+    block_numbers       of inserted blocks, if every block has one: "same" as the block that they belong to, "none", or
+                        "renumber": all blocks anew
+    closure_mm          the control refuses an arc whose start and end radii differ by more than this, mm,
+    closure_relative    and by more than this, relative to the radius (both must be exceeded)
     decimal_inches      an increment of 0.001 mm is one of 0.0001 inch in programs in inches, as in IS-B
-    most_inverse_time   the largest F in inverse time (G93), per minute; 0: not known, or any
-    feed_of             whose speed F is where linear and rotary axes move together: "linear" (rotary axes keep pace),
-                        "all" (of all axes together), or "" where that differs from control to control
-    understands         what is followed and corrected, a short sentence each; for `ncfix dialects NAME`
-    passes              what is left as it is, by rule
-    refuses             what cannot be corrected, and is named with its line
-    language            where its `Language` is: the functions that read, follow and write it, as "module:NAME"
-    returns             a regular expression (bytes) in a block that ends a subprogram, its comments left out
-    semantics           which of its language's rule sets holds, where there are several. A name that the language does
-                        not know is an error (NCF508) when the language is needed
-    codes, cycles       what it adds to the codes of its language, see `derive`
-    keywords            what its blocks say in words, and the G or M code or the address that each stands for: ("MOVE",
+    most_inverse_time   largest F in inverse time (G93), 1/min; 0: unknown or unlimited
+    feed_of             the speed that F defines if linear and rotary axes move together: "linear" (rotary axes keep
+                        pace), "all" (of all axes together), or "" if that differs from control to control
+    understands         what is followed and corrected, in short sentences; for `ncfix dialects NAME`
+    passes              what stays uncorrected by rule
+    refuses             what cannot be corrected, and is reported with its line
+    language            the `Language` object with the functions that read, follow and write it, as "module:NAME"
+    returns             regular expression (bytes) that finds the end of a subprogram in a block without its comments
+    semantics           name of the rule set of its language, if there are several. A name that the language does not
+                        know is an error (NCF508) when the language is needed
+    codes, cycles       codes added to those of its language, see `derive`
+    keywords            words used in its blocks, with the G or M code or the address that each stands for: ("MOVE",
                         "G1"), ("FEED", "F"); its grammar makes a `code` of the former, the address of a `word` of the
                         latter
     assign              what stands between an address and its number, as in X=10
-    signed              words that are added have a sign in any case, as in X+10
+    signed              words that are added always have a sign, as in X+10
     """
 
     name: str
@@ -234,7 +234,7 @@ class Dialect:
     language: str = field(kw_only=True)
 
     def cycle_of(self, code: int) -> CycleTable:
-        """The drilling cycle that a code is, in tenths."""
+        """The drilling cycle table of a code in tenths."""
         return next((table for name, table in self.cycles if tenths(name) == code), FAMILY_CYCLE)
 
     def derive(
@@ -247,17 +247,18 @@ class Dialect:
         keywords: Mapping[str, str] | None = None,
         **changes: Any,
     ) -> Dialect:
-        """A dialect of a control that is a relative of this one: all as here, but for what is given.
+        """A dialect derived from this one; everything that is not given is inherited.
 
-        codes    "G100", "M180", "G54.4" -> what it does, operations of `ncfix.control.operations` in order; none: it
-                 moves nothing and changes no coordinates
+        codes    "G100", "M180", "G54.4" -> what it does: operations of `ncfix.control.operations`, in order; an empty
+                 list: it moves nothing and changes no coordinates
         cycles   "G177" -> the drilling cycle that it is
-        keywords "MOVE" -> "G1", "FEED" -> "F": the words of a language whose blocks are no letters and numbers;
-                 of several for one code the first is written
-        changes  of any other field. Without them its suffixes and signatures are none, so that programs are only read
-                 as this if the machine file or --dialect says so
+        keywords "MOVE" -> "G1", "FEED" -> "F": the words of a language whose blocks are not letters and numbers;
+                 of several keywords for one code, the first is written
+        changes  other fields. Suffixes and signatures are not inherited, so that programs are read in this dialect only
+                 if the machine file or --dialect says so
 
-        Raises ValueError for what cannot be: see `complaint`, and a sign of comments that the language does not read.
+        Raises ValueError for impossible values: see `complaint`, and for a comment form that the language does not
+        read.
         """
         if unknown := changes.keys() - {each.name for each in fields(self)}:
             known = ("codes", "cycles", "keywords", *(each.name for each in fields(self)))
@@ -287,7 +288,7 @@ class Dialect:
         return made
 
     def complaint(self) -> str:
-        """What is wrong with its fields, codes and cycles; empty if nothing is."""
+        """What is wrong with its fields, codes and cycles, in words; empty if nothing is."""
         if not isinstance(self.line_limit, int) or self.line_limit < 0:
             return f"{self.line_limit!r} cannot be the line_limit: a number of characters, 0 for none"
         if self.feed_of not in ("linear", "all", ""):
@@ -317,7 +318,7 @@ class Dialect:
 
 
 def complaint_of_code(code: str, operations: Sequence[CodeOperation]) -> str:
-    """What is wrong with a code of a dialect's own; empty if nothing is."""
+    """What is wrong with a dialect's own code, in words; empty if nothing is."""
     for each in operations:
         if isinstance(each, type) or not hasattr(each, "carry_out"):
             shown = getattr(each, "__name__", repr(each))
@@ -338,7 +339,7 @@ def complaint_of_code(code: str, operations: Sequence[CodeOperation]) -> str:
 
 
 DEFAULT = "iso"
-"""What a text is read as if neither its name nor its content says more."""
+"""The dialect of a text whose name and content suggest no other."""
 
 
 def names() -> tuple[str, ...]:
@@ -347,7 +348,7 @@ def names() -> tuple[str, ...]:
 
 
 def get(name: str) -> Dialect:
-    """The dialect of that name; raises UsageError NCF104."""
+    """The dialect with this name; raises UsageError NCF104."""
     known: dict[str, Dialect] = registry("dialects")
     if name not in known:
         raise UsageError.of("NCF104", f"no dialect {name!r}", hint=nearest(name, known))
@@ -355,7 +356,7 @@ def get(name: str) -> Dialect:
 
 
 def detect(source: bytes, path: str, control: str = "") -> Dialect:
-    """The dialect of a text: by its content, a suffix that only one language has, the machine's control; else ISO."""
+    """The dialect of a text, found from its content, from a suffix, or from the machine's control; else ISO."""
     known: dict[str, Dialect] = registry("dialects")
     head = beginning_without_comments(source)
     ranks = {name: rank for name, dialect in known.items() if (rank := signature_rank(dialect, head)) is not None}
@@ -371,7 +372,7 @@ def detect(source: bytes, path: str, control: str = "") -> Dialect:
 
 
 def other_control(dialect: Dialect, control: str, path: str) -> Message | None:
-    """A remark (NCF106) on a program whose text shows another family's language than that of the machine's control."""
+    """The remark (NCF106) that a program is in the language of another family than the machine's control."""
     own: Dialect | None = registry("dialects").get(control)
     if own is None or (own.variant_of or own.name) == (dialect.variant_of or dialect.name):
         return None
@@ -380,14 +381,14 @@ def other_control(dialect: Dialect, control: str, path: str) -> Message | None:
 
 
 def signature_rank(dialect: Dialect, head: bytes) -> int | None:
-    """Which of the dialect's signatures is found first in `head`, in the order of their strength; None for none."""
+    """Index of the dialect's strongest signature found in `head`; None if there is none."""
     with working("dialects", dialect.name):
         found = (rank for rank, pattern in enumerate(dialect.signature) if re.search(pattern, head))
         return next(found, None)
 
 
 def goes_back(block: bytes, dialect: Dialect) -> bool:
-    """Whether a block ends a subprogram, so that what has called it goes on."""
+    """Whether a block ends a subprogram, so that its caller continues."""
     return bool(dialect.returns and re.search(dialect.returns, COMMENT_TEXT.sub(b"", block)))
 
 
@@ -401,20 +402,20 @@ OTHER_FILES = {
     "setup file": rb"(?m)^[ \t]*\[(?:work_offsets|tools|initial)\]",
     "measurement file": rb"\A# *ncfix-measurement",
 }
-"""What other files of ncfix show."""
+"""Patterns that identify other files of ncfix."""
 
 PROBE_BYTES = 1 << 16
-"""How much of a text is looked at to find out what it is."""
+"""Number of bytes of a text that are examined to identify it."""
 
 COMMENT_TEXT = re.compile(
     rb"(?<=\()(?!(?i:" + FAGOR + rb"))(?:[^()\r\n]|\([^()\r\n]*\))+|(?<=;)(?![ \t]*\$PATH)[^\r\n]+"
 )
-"""What a comment says, up to its closing bracket or the end of the line; in `;$PATH=` SINUMERIK says where a program
-is kept, and Fagor's statements stand in brackets."""
+"""The content of a comment, up to its closing bracket or the end of the line. Two things are no comments: `;$PATH=`, by
+which SINUMERIK says where a program is kept, and Fagor's statements in brackets."""
 
 
 def check_content(source: bytes, path: str, dialect: Dialect) -> None:
-    """Refuse what is not text (NCF101), holds nothing (NCF102), or is another family's language (NCF103)."""
+    """Refuse bytes that are not text (NCF101), an empty program (NCF102), or another family's language (NCF103)."""
     if source.startswith(UTF16_MARKS):
         raise SourceError.of("NCF101", "the text is UTF-16", Place(path, 1), "save it as ASCII, Latin-1 or UTF-8")
     check_zeros(source, path)
@@ -432,19 +433,19 @@ def check_content(source: bytes, path: str, dialect: Dialect) -> None:
 
 
 def is_keyword(sign: bytes, dialect: Dialect) -> bool:
-    """Whether what shows another language is, or begins, a keyword of this one."""
+    """Whether the sign of another language is a keyword of this one, or the beginning of one."""
     word = "".join(sign.decode("latin-1").upper().split())
     return any(keyword.startswith(word) for keyword, _ in dialect.keywords)
 
 
 def beginning_without_comments(source: bytes) -> bytes:
-    """The first `PROBE_BYTES` of a text with blanks for what its comments say, byte for byte: signs of a language count
-    outside comments only. The brackets of a comment stay, as in other languages they enclose arguments."""
+    """The first `PROBE_BYTES` of a text with the content of comments blanked, since signs of a language count outside
+    comments only. Byte positions are kept. The brackets of comments stay: in other languages they enclose arguments."""
     return COMMENT_TEXT.sub(lambda found: b" " * len(found[0]), source[:PROBE_BYTES])
 
 
 def check_zeros(source: bytes, path: str, first_line: int = 1) -> None:
-    """Refuse zero bytes (NCF101); `first_line` is that of the file on which the text begins."""
+    """Refuse zero bytes (NCF101); `first_line`: line number of the file at which the text begins."""
     zero = source.find(b"\0")
     if zero >= 0:
         found = place_of(source, zero, path)
@@ -453,7 +454,7 @@ def check_zeros(source: bytes, path: str, first_line: int = 1) -> None:
 
 
 def place_of(source: bytes, byte: int, path: str, encoding: str = "") -> Place:
-    """The line and column of a byte, with the line's text if an encoding is given."""
+    """The line and column of a byte; with the text of the line if an encoding is given."""
     line = source.count(b"\n", 0, byte) + 1
     start = source.rfind(b"\n", 0, byte) + 1
     text = source[start:].split(b"\n", 1)[0].rstrip().decode(encoding, "replace") if encoding else ""
@@ -461,7 +462,7 @@ def place_of(source: bytes, byte: int, path: str, encoding: str = "") -> Place:
 
 
 def encoded(text: str, path: str) -> bytes:
-    """A text as the bytes of a file, Latin-1; raises `SourceError` NCF101 for a character that has none."""
+    """A text encoded as Latin-1; raises `SourceError` NCF101 for a character outside it."""
     try:
         return text.encode("latin-1")
     except UnicodeEncodeError as error:
@@ -472,5 +473,5 @@ def encoded(text: str, path: str) -> bytes:
 
 
 def header_length(source: bytes) -> int:
-    """How many bytes stand before the first block: the mark of UTF-8, if it is there."""
+    """Number of bytes before the first block: the byte order mark of UTF-8, if present."""
     return len(UTF8_MARK) if source.startswith(UTF8_MARK) else 0

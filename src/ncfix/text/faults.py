@@ -1,4 +1,4 @@
-"""Why a block cannot be read, said to people: from the parser's complaint to a coded message with its place."""
+"""Turns the parser's failure into a message for people: a coded error with its place in the block."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MACRO_B = re.compile(
     r"[ \t/]*(?:N\d+[ \t]*)?(?P<keyword>IF[ \t]*\[|WHILE[ \t]*\[|GOTO[ \t]*[\d#\[]|END[ \t]*\d|DO[ \t]*\d)",
     re.IGNORECASE,
 )
-"""Flow control as Fanuc and its like have it."""
+"""Flow control of Fanuc and similar controls."""
 
 FUNCTIONS = re.compile(r"(abs|acos|asin|atan|cos|exists|exp|fix|fup|ln|round|sin|sqrt|tan)\Z", re.IGNORECASE)
 KEYWORDS = (
@@ -36,12 +36,12 @@ HINTS = {
 NUMERIC = frozenset("0123456789.")
 SIGNS = frozenset("+-")
 BARE = re.compile(r"#(\d+|<[^<>]*>)=[^=]+\Z")
-"""A parameter and its value, behind which an expression goes on that has no brackets."""
+"""An assignment followed by an operator: an expression without brackets."""
 
 
 @frozen
 class BlockError(Exception):
-    """What is the matter in a block, and where in it (from 0)."""
+    """What is wrong in a block; `place`: index of the character in it."""
 
     code: str
     text: str
@@ -50,7 +50,7 @@ class BlockError(Exception):
 
 
 def explain(place: int, text: str, squeezed: UnspacedBlock) -> BlockError:
-    """The fault of a block, from the place in it, without blanks, at which the parser stopped."""
+    """The error in a block, from the place in the squeezed block at which the parser stopped."""
     stop = Stop(text, squeezed, place)
     found = (look(stop) for look in (in_comment, in_number, in_expression, in_brackets, in_flow, in_word))
     return next((fault for fault in found if fault), None) or unexpected(stop)
@@ -58,12 +58,12 @@ def explain(place: int, text: str, squeezed: UnspacedBlock) -> BlockError:
 
 @frozen
 class Stop:
-    """Where the parser stopped in a block.
+    """The place at which the parser stopped in a block.
 
     text      the block
     squeezed  the block without blanks
-    position  in the squeezed block
-    at        the character there, empty at the end of the block
+    position  index in the squeezed block
+    at        the character there; empty at the end of the block
     before    the character before it
     rest      the block from there on
     """
@@ -82,29 +82,29 @@ class Stop:
         object.__setattr__(self, "rest", self.text[self.place() :])
 
     def place(self, back: int = 0) -> int:
-        """The place in the block, or of the character so many before."""
+        """Index in the block of the character here, or `back` characters before."""
         places = self.squeezed.places
         position = self.position - back
         return places[position] if position < len(places) else len(self.text)
 
     def fault(self, code: str, text: str, hint: str = "", back: int = 0) -> BlockError:
-        """A fault here, or so many characters before."""
+        """An error here, or `back` characters before."""
         return BlockError(code, text, self.place(back), hint)
 
     def not_closed(self) -> BlockError:
-        """The innermost bracket that is open here is never closed."""
+        """The error that the innermost open bracket is never closed."""
         opened = unmatched(self.squeezed.code[: self.position])[-1]
         return BlockError("NCF113", "the bracket is not closed", self.squeezed.places[opened], "close it with ]")
 
 
 def bare_expression(place: int) -> BlockError:
-    """An operator outside brackets."""
+    """The error that an expression has no brackets."""
     text = "in this dialect an expression stands in brackets [ ]"
     return BlockError("NCF110", text, place, "--dialect fanuc, if the control takes it without them")
 
 
 def in_comment(stop: Stop) -> BlockError | None:
-    """A comment without an end, without a start, or with another in it."""
+    """Errors of comments: not closed, not opened, or nested."""
     if stop.at == ")":
         return stop.fault("NCF111", "no comment is open that this ) could close")
     if stop.at != "(":
@@ -119,7 +119,7 @@ def in_comment(stop: Stop) -> BlockError | None:
 
 
 def in_number(stop: Stop) -> BlockError | None:
-    """A second point or sign, a point alone, or a decimal comma."""
+    """Errors of numbers: a second point or sign, no digit, or a decimal comma."""
     if stop.at == "." and stop.before in NUMERIC:
         return stop.fault("NCF115", "the number has a second point")
     if stop.at == ".":
@@ -132,7 +132,7 @@ def in_number(stop: Stop) -> BlockError | None:
 
 
 def in_expression(stop: Stop) -> BlockError | None:
-    """An operator or a value that is missing, a function that is none, or an expression without its brackets."""
+    """Errors of expressions: a missing operator or value, an unknown function, or missing brackets."""
     done = stop.squeezed.code[: stop.position]
     if stop.at in {*SIGNS, "*", "/"} and BARE.search(done) and not unmatched(done):
         return bare_expression(stop.place())
@@ -153,7 +153,7 @@ def in_expression(stop: Stop) -> BlockError | None:
 
 
 def in_expression_word(stop: Stop) -> BlockError:
-    """A letter inside brackets that starts nothing the language knows there."""
+    """The error at a word inside brackets that the language does not know."""
     name = re.match(r"[A-Za-z]*", stop.rest)
     shown = repr(name[0]) if name and name[0] else repr(stop.at)
     if name and name[0].upper() in COMPARISONS:
@@ -166,7 +166,7 @@ def in_expression_word(stop: Stop) -> BlockError:
 
 
 def in_brackets(stop: Stop) -> BlockError | None:
-    """Brackets that do not match, or with nothing or a sign of another language in them."""
+    """Errors of brackets: not matching, empty, or with an operator of another language in them."""
     open_before = unmatched(stop.squeezed.code[: stop.position])
     if stop.at == "]" and not open_before:
         return stop.fault("NCF113", "no bracket is open that this ] could close")
@@ -180,7 +180,7 @@ def in_brackets(stop: Stop) -> BlockError | None:
 
 
 def unmatched(code: str) -> list[int]:
-    """Where brackets open in `code` that are not closed."""
+    """Indices of the brackets in `code` that are not closed."""
     stack: list[int] = []
     for position, character in enumerate(code):
         if character == "[":
@@ -191,7 +191,7 @@ def unmatched(code: str) -> list[int]:
 
 
 def in_flow(stop: Stop) -> BlockError | None:
-    """A block of flow control with a wrong keyword, without one, or with more than belongs to it."""
+    """Errors of flow control: a wrong keyword, none, or something after it."""
     start = FLOW.match(stop.squeezed.code)
     if start is None or unmatched(stop.squeezed.code[: stop.position]):
         return None
@@ -210,7 +210,7 @@ def in_flow(stop: Stop) -> BlockError | None:
 
 
 def in_word(stop: Stop) -> BlockError | None:
-    """An address, a parameter or an `=` without what belongs to it; text that is no word at all."""
+    """Errors of words: an address, a parameter or an `=` without its value; text that is no word."""
     if (macro := MACRO_B.match(stop.text)) and stop.place() < macro.end("keyword"):
         text = "this is flow control of another dialect (Macro B)"
         return BlockError("NCF110", text, macro.start("keyword"), "name it with --dialect")
@@ -227,7 +227,7 @@ def in_word(stop: Stop) -> BlockError | None:
 
 
 def in_address(stop: Stop) -> BlockError:
-    """A letter without a value."""
+    """The error that an address has no value."""
     address = stop.before.upper()
     prose = re.match(r"[A-Za-z_]{3,}", stop.text[stop.place(1) :])
     if prose:
@@ -243,7 +243,7 @@ def in_address(stop: Stop) -> BlockError:
 
 
 def unexpected(stop: Stop) -> BlockError:
-    """Anything else: what stands where the parser stopped."""
+    """Any other error: names the character at which the parser stopped."""
     if not stop.at:
         return stop.fault("NCF110", "the block is not complete")
     if stop.at == "\r":

@@ -1,7 +1,7 @@
-"""A dialect's grammar: where its file is, and one block of text made into a tree by it.
+"""The grammar of a dialect: its file, its parser, and the parse of one block into a tree.
 
-The `.lark` file is the only definition of what a block is. Blanks mean nothing outside comments, so they are taken
-out before the parser sees the text (`squeeze`), and every position is put back where it was in the block.
+The `.lark` file is the only definition of what a block is. Blanks have no meaning outside comments, so they are removed
+before parsing (`squeeze`); positions are then mapped back to the block.
 """
 
 from __future__ import annotations
@@ -27,41 +27,41 @@ if TYPE_CHECKING:
 PACKAGE = Path(__file__).resolve().parents[1]
 
 FOLDERS = (PACKAGE / "grammars", PACKAGE.parents[1] / "grammars")
-"""Where grammars are: inside an installed package, and beside `src` in a source tree."""
+"""Folders of grammars: inside an installed package, and beside `src` in a source tree."""
 
 PIECE = re.compile(r"\([^()]*\)|;.*|[^ \t]", re.DOTALL)
-"""What squeezing keeps: comments whole, and single characters that are not blank."""
+"""What squeezing keeps: whole comments, and single characters other than blanks."""
 
 
 @frozen
 class UnspacedBlock:
     """A block without the blanks outside comments.
 
-    code    what is left
-    places  place in the block of each character of `code`
+    code    the remaining characters
+    places  for each character of `code`, its index in the block
     """
 
     code: str
     places: list[int]
 
     def span(self, start: int, stop: int) -> tuple[int, int]:
-        """Where a stretch of `code` starts and stops in the block."""
+        """Start and stop in the block of a range of `code`."""
         if start == stop:
             return 0, 0
         return self.places[start], self.places[stop - 1] + 1
 
 
 def squeeze(text: str, piece: re.Pattern[str] = PIECE) -> UnspacedBlock:
-    """Take out the blanks outside comments; `piece`: what is kept."""
+    """Remove the blanks outside comments; `piece`: pattern of what is kept."""
     spans = [match.span() for match in piece.finditer(text)]
     code = "".join(text[start:stop] for start, stop in spans)
     return UnspacedBlock(code, [place for span in spans for place in range(*span)])
 
 
 def find_grammar(name: str) -> Path:
-    """The file of a grammar: a path of its own (a plugin's), or a name of those that ship with ncfix.
+    """The file of a grammar: a path (of a plugin), or the name of a grammar that ships with ncfix.
 
-    Raises FileNotFoundError: an installation without its grammars, or a plugin that names a wrong one.
+    Raises FileNotFoundError: the installation lacks its grammars, or a plugin names a wrong one.
     """
     for path in (Path(name), *(folder / name for folder in FOLDERS)):
         if path.is_file():
@@ -71,10 +71,10 @@ def find_grammar(name: str) -> Path:
 
 
 def place_of_tables(grammar: Path) -> str | None:
-    """Where the tables of a grammar's parser are kept: beside what Python keeps of this module, or in the user's cache.
+    """The file for a grammar's parser tables: in a cache folder beside this module, or in the user's cache.
 
-    None if nothing can be kept. Lark takes them only for the same grammar, with all that it imports, in the same Python
-    and version of Lark.
+    None if neither can be written. Lark reuses the tables only for the same grammar, including its imports, and the
+    same versions of Python and Lark.
     """
     name = f"{grammar.stem}.{sha256(str(grammar).encode()).hexdigest()[:12]}.{sys.implementation.cache_tag}.tables"
     for folder in cache_folders(__file__):
@@ -87,12 +87,12 @@ def place_of_tables(grammar: Path) -> str | None:
 
 @lru_cache(maxsize=32)
 def parser(name: str) -> Lark:
-    """The LALR parser of a grammar; its tables are worked out once (0.1 s), and kept on the disk."""
+    """The LALR parser of a grammar; its tables are computed once (0.1 s) and kept on disk."""
     return parser_of(name, place_of_tables(find_grammar(name)))
 
 
 def parser_of(name: str, tables: str | None = None) -> Lark:
-    """A new LALR parser of a grammar, which takes its tables from a file, or leaves them there."""
+    """A new LALR parser of a grammar, with its tables read from the file `tables`, or written to it."""
     from lark import Lark
 
     return Lark.open(
@@ -107,7 +107,7 @@ def parser_of(name: str, tables: str | None = None) -> Lark:
 
 
 class UnparsedError(Exception):
-    """The grammar has no such block; `place` is where in it the parser stopped, its length if it lacks something."""
+    """The grammar does not match the block; `place`: where the parser stopped (at the end: something is missing)."""
 
     def __init__(self, place: int) -> None:
         super().__init__(place)

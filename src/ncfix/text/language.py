@@ -1,8 +1,8 @@
-"""A family of controls, as the functions in which they differ: how its texts are read, and where their words stand.
+"""A language: the functions in which a family of controls differs from others, such as how its texts are read.
 
-The tree, the motions, the frames and the walk of the emitter are the same for all. What a line is, what a number is,
-what a block means and how a corrected motion is put into words is a family's own, and a `Dialect` names its family.
-`control.interpreter` adds how its programs are followed, and `writer.language` how they are written.
+Tree, motions, frames and the emitter are common to all families. What a line, a number and a block mean, and how a
+corrected motion is put into words, is defined by the family; a `Dialect` names its family. `control.interpreter` adds
+how programs are followed, and `writer.language` how they are written.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ if TYPE_CHECKING:
 
 
 class BlockLayout(Protocol):
-    """Where things stand in a motion block; what else there is, only the family's own writer knows."""
+    """The writable places of a motion block; only the family's own writer knows more of it."""
 
     @property
     def motion(self) -> Word | None:
-        """The word that says which kind of motion it is, if the block has one."""
+        """The word with the motion code; None if the block has none."""
 
 
 @frozen
 class ArcLayout:
-    """Where the words that say where the centre of an arc is stand in the blocks of one shape.
+    """Places of the words that give an arc's centre, in the blocks of one shape.
 
-    centre  I J K -> which of the block's numbers each has
-    fixed   which of them count from the origin, whatever else is in force
-    radius  which of them R has, and where that word stands, with the blank before it; None without
-    alone   none of this is known: `BlockWriter` writes the arc, once the motions around it are written
+    centre  I J K -> slot of its number in the block
+    fixed   letters of those that count from the origin, whatever mode is in force
+    radius  slot of R, and the span of its word with the blank before it; None without R
+    alone   the places are not known: `BlockWriter` writes the arc, after the motions around it
     """
 
     centre: Mapping[str, int]
@@ -51,19 +51,19 @@ class ArcLayout:
 
 @frozen
 class BulkLayout:
-    """Where things stand in the blocks of one shape, for motions that are written many at a time.
+    """Places in the blocks of one shape, for writing many motions at once.
 
-    slots     axis letter -> which of the block's numbers its word has
+    slots     axis letter -> slot of its word's number in the block
     words_at  where missing axis words go
-    blank     what stands before them: a blank or nothing
+    blank     separator before them: a blank or nothing
     lower     addresses are in lower case
-    further   further pieces of such a motion may follow as lines of nothing but axis words
-    lead      of languages in which such lines begin with more than that: what of the block's own beginning they repeat
-    opening   what stands on such lines before the axis words
-    closing   what stands on them behind these
-    only_named_rotary  a rotary axis that has no word gets none
-    by_vector  rotary axes go where other words of the block lead them, exactly; they have none of their own
-    arc       what there is of arcs; None where these are written one by one
+    further   a split motion may continue in lines that contain only axis words
+    lead      the beginning of the block up to here is repeated in such lines; None: it is not
+    opening   text of such lines before the axis words
+    closing   text of such lines after the axis words
+    only_named_rotary  a rotary axis without a word gets none
+    by_vector  other words of the block define the rotary axes exactly; they have no words of their own
+    arc       places of arc words; None: arcs are written one by one
     """
 
     slots: Mapping[str, int]
@@ -81,23 +81,22 @@ class BulkLayout:
 
 @frozen(kw_only=True)
 class Language:
-    """How the texts of one family of controls are read.
+    """How texts of one family of controls are read.
 
-    split     source -> (n, 2) start and stop byte of each block, line ends not included
-    end       (source, blocks) -> the block that ends the program's text: what follows is passed over; len(blocks) if
-              nothing does
-    scan      (source, blocks) -> shapes and numbers of the blocks, without understanding them
-    parse     (dialect, text) -> one block by its grammar; raises `BlockError`
-    lenient   a block that cannot be read, and that the control may never get to, is no error until it does
-    layout    (program, block) -> the parts of a motion block that may be written; None where nothing may
-    same_per_shape  those of all blocks of a shape are the same
-    spelling  program -> how what is put into it is spelled
-    bulk      (program, block) -> what `writer` would need to know to write motions like this one many at a time; None
-              for blocks that it has to write one by one
-    renumber  a text with its blocks numbered anew; None where blocks need no numbers
-    straight  a program with blocks of this shape may come in parts: they have nothing to do with others elsewhere
-    semantics  the rule sets that the family has, by the names that `Dialect.semantics` may give
-    own_codes  it takes the codes, cycles and keywords that a dialect adds
+    split     source -> (n, 2) start and stop byte of each block, without line ends
+    end       (source, blocks) -> the block that ends the program text, after which text is ignored; else len(blocks)
+    scan      (source, blocks) -> shapes and numbers of the blocks, without parsing them
+    parse     (dialect, text) -> one block, parsed by its grammar; raises `BlockError`
+    lenient   an unreadable block that the control may never reach is an error only when it is reached
+    layout    (program, block) -> the writable parts of a motion block; None if nothing may be written
+    same_per_shape  the layout is the same for all blocks of a shape
+    spelling  program -> how inserted text is spelled
+    bulk      (program, block) -> what the writer needs to write motions of this shape many at a time; None for blocks
+              that must be written one by one
+    renumber  text -> the text with its blocks renumbered; None if blocks need no numbers
+    straight  template -> whether a program with such blocks may be processed in parts: they refer to no other blocks
+    semantics  names of its rule sets, for `Dialect.semantics`
+    own_codes  whether dialects may add codes, cycles and keywords
     """
 
     split: Callable[[bytes], Ints]
@@ -119,9 +118,10 @@ L = TypeVar("L", bound=Language)
 
 
 def language_of(dialect: Dialect, part: type[L]) -> L:
-    """The language of a dialect, as far as its user needs to know it; imported when it is first needed.
+    """The language of a dialect as an instance of `part`; imported when it is first needed.
 
-    Raises `PluginError`: NCF507 if the import fails, NCF508 if what it names is not that or has no such semantics.
+    Raises `PluginError`: NCF507 if the import fails, NCF508 if the object is no `part` or lacks the dialect's
+    semantics.
     """
     language = loaded(dialect)
     if not isinstance(language, part):
@@ -132,7 +132,7 @@ def language_of(dialect: Dialect, part: type[L]) -> L:
 
 @lru_cache(maxsize=32)
 def loaded(dialect: Dialect) -> Language:
-    """What a dialect names as its language, imported once; raises as `language_of`."""
+    """The language object that a dialect names, imported once; raises as `language_of`."""
     language: Language = called("dialects", dialect.name, resolve_name, dialect.language, gives=Language)
     assert isinstance(language, Language), f"{dialect.language} is no Language"
     if dialect.semantics not in language.semantics:

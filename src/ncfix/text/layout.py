@@ -1,4 +1,4 @@
-"""Where things stand in a motion block: which words may be rewritten, and where a missing word or code goes."""
+"""The layout of a motion block: which words may be rewritten, and where a missing word or code goes."""
 
 from __future__ import annotations
 
@@ -9,45 +9,45 @@ from ncfix.text.language import ArcLayout, BulkLayout
 from ncfix.text.tree import Anchor, Constant, Literal, Opaque, OWordLine, Program, Skip, Span, Tape, Word
 from ncfix.values import frozen
 
-#: In the order in which programs write them.
+#: In the usual order of words in programs.
 AXIS_LETTERS = "XYZABCUVW"
 MOTION_CODES = frozenset((0.0, 1.0, 2.0, 3.0))
 CONTROL_CHARACTER = "control character"
-"""The kind of an `Opaque` that moves nothing and may stand anywhere (DC1, Grbl's `?`)."""
+"""Kind of an `Opaque` that moves nothing and may stand anywhere (DC1, Grbl's `?`)."""
 ABSOLUTE, INCREMENT = "ac", "ic"
-"""Forms of words, see `Layout.forms`."""
+"""Forms of axis words, see `Layout.forms`."""
 
 FEED_MODES = frozenset((93.0, 94.0))
 CENTRE_LETTERS = ("I", "J", "K")
 #: M codes that act after the motion of their block: they belong on its last piece.
 CODES_AFTER_MOTION = frozenset((0.0, 1.0, 2.0, 30.0, 60.0, 99.0))
 EXACT_STOP = frozenset((9.0,))
-"""G9: the control comes to a stop at the end of the block, that of its last piece."""
+"""G9: the control stops at the end of the block; after splitting, at the end of its last piece."""
 
 
 @frozen(kw_only=True)
 class Layout:
-    """The writable parts of a motion block; what a control does not have is empty.
+    """The writable parts of a motion block; empty where the control has none.
 
     axes      axis words by letter
-    forms     how such a word is meant, if the word itself says so, by address: "ac" an absolute value, "ic" an
-              increment, others an angle to which a rotary axis turns in a sense, whole turns left out
+    forms     forms stated by words themselves, by address: "ac" an absolute value, "ic" an increment, others an angle
+              that a rotary axis approaches in a given direction, whole turns left out
     centre    I J K words by letter
-    radius    the word of an arc's radius
-    turns     that of its number of turns
+    radius    word of the arc's radius
+    turns     word of its number of turns
     feed      the F word
     motion    the G0..G3 word
     feed_mode the G93 or G94 word
-    vector    words of the direction of the tool, by address
-    angles    those that give it as angles: they give way to a vector
+    vector    words of the tool direction, by address
+    angles    words that give the tool direction as angles; a vector replaces them
     after     words that act at the end of the motion (M0, M1, M2, M30, M60, M99, G9)
-    words_at  where a missing axis word goes: after the last axis word
-    code_at   where a missing motion code goes: before the first axis word
-    blank     what separates words in this block
-    prefix    the span of the block skip, which further pieces repeat
-    levels    words that may give the level of a canned cycle, by their address
-    closing   what further pieces end with besides
-    allowed   axes that may get a word where they have none; None: all
+    words_at  place for a missing axis word: after the last axis word
+    code_at   place for a missing motion code: before the first axis word
+    blank     separator of words in this block
+    prefix    span of the block skip, which inserted blocks repeat
+    levels    words that may give the level of a canned cycle, by address
+    closing   additional text at the end of inserted blocks
+    allowed   axes that may get a word if they have none; None: all
     """
 
     axes: dict[str, Word]
@@ -71,7 +71,7 @@ class Layout:
 
 
 class BlockWords:
-    """The words of one block, by their address and by their code, and where others go beside them."""
+    """The words of one block, by address and by code."""
 
     def __init__(self, program: Program, block: int) -> None:
         self.program, self.block = program, block
@@ -81,24 +81,24 @@ class BlockWords:
         self.axes = {word.address: word for word in self.words if word.address in AXIS_LETTERS}
 
     def some(self, addresses: Iterable[str]) -> dict[str, Word]:
-        """The words of these addresses that the block has, in this order."""
+        """Those of `addresses` that the block has, with their words, in the order given."""
         return {address: self.by_address[address] for address in addresses if address in self.by_address}
 
     def coded(self, address: str, codes: frozenset[float]) -> tuple[Word, ...]:
-        """The words of an address that have one of these codes."""
+        """The words with this address and one of these codes."""
         return tuple(word for word in self.words if word.address == address and self._code(word) in codes)
 
     def g_code(self, codes: frozenset[float]) -> Word | None:
-        """The first G word that has one of these codes."""
+        """The first G word with one of these codes."""
         return next(iter(self.coded("G", codes)), None)
 
     @property
     def skip(self) -> Span | None:
-        """Where block skip stands."""
+        """The span of the block skip; None without one."""
         return next((item.span for item in self.items if isinstance(item, Skip)), None)
 
     def beside(self, words: Sequence[Word]) -> tuple[Anchor, Anchor, str]:
-        """The places behind and before some words, and what stands before the last of them: a blank or nothing."""
+        """The places after and before some words, and the separator before the last of them: a blank or nothing."""
         last = max(words, key=lambda word: self.program.position(self.block, word.span.stop))
         first = min(words, key=lambda word: self.program.position(self.block, word.span.start))
         at = self.program.position(self.block, last.span.start)
@@ -135,7 +135,7 @@ def layout_of(program: Program, block: int) -> Layout:
 
 
 def has_free_text(program: Program, block: int) -> bool:
-    """Whether the block holds what may mean more than words do: flow, tape marks, opaque text."""
+    """Whether the block holds items that may mean more than words: flow control, tape marks, opaque text."""
     return any(
         isinstance(item, (OWordLine, Tape)) or (isinstance(item, Opaque) and item.kind != CONTROL_CHARACTER)
         for item in program.items_of(block)
@@ -143,7 +143,7 @@ def has_free_text(program: Program, block: int) -> bool:
 
 
 def bulk_layout(program: Program, block: int, layout: Layout) -> BulkLayout | None:
-    """The part of a layout that holds for all blocks of the shape; None if an axis word is no plain number."""
+    """The part of a layout that is the same for all blocks of the shape; None if an axis word is no plain number."""
     slots = {letter: word.value.slot for letter, word in layout.axes.items() if isinstance(word.value, Literal)}
     if len(slots) < len(layout.axes):
         return None
@@ -152,7 +152,7 @@ def bulk_layout(program: Program, block: int, layout: Layout) -> BulkLayout | No
 
 
 def arc_layout(program: Program, block: int, layout: Layout) -> ArcLayout | None:
-    """Where the words of an arc stand; None if one of them is no plain number, or R stands beside a centre."""
+    """Places of the words of an arc; None if one of them is no plain number, or if R and a centre are both given."""
     slots = {letter: word.value.slot for letter, word in layout.centre.items() if isinstance(word.value, Literal)}
     word = layout.radius
     if len(slots) < len(layout.centre) or (word is not None and (slots or not isinstance(word.value, Literal))):

@@ -1,7 +1,7 @@
-"""The numbers of a text, found and converted in bulk.
+"""Finds and converts the numbers of a text in bulk.
 
-A number here is a run of digits and points, with the sign before it. What a run means is for the grammar to say: the
-reader compares the two for every shape, and goes by the grammar where they differ.
+A number is a run of digits and points, with the sign before it. Only the grammar knows what a run means: the reader
+compares both for every shape, and follows the grammar where they differ.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from ncfix.arrays import Array, Bytes, Ints, Mask
 from ncfix.values import frozen
 
 EXACT_DIGITS = 15
-"""Up to so many digits a number and its power of ten are exact in a double, and so is their rounded quotient."""
+"""Largest number of digits of which number and power of ten are exact doubles: their quotient is correctly rounded."""
 
 POINT = ord(".")
 
 
 def table(characters: bytes) -> Mask:
-    """A look-up table: which bytes are among `characters`."""
+    """Look-up table (256,): which bytes are among `characters`."""
     found = np.zeros(256, dtype=np.bool_)
     found[list(characters)] = True
     return found
@@ -32,20 +32,20 @@ SIGN = table(b"+-")
 BLANK = table(b" \t")
 
 BLANKS = 3
-"""How many blanks the scan looks across, before a number or its sign."""
+"""Number of blanks that the scan skips before a number or its sign."""
 
 UNSIGNED_AFTER = table(b"0123456789.]>Nn#")
-"""After these a sign does not belong to the number: it is an operator, or wrong."""
+"""After these characters a sign is not part of the number: it is an operator, or an error."""
 
 
 @frozen
 class Numbers:
-    """The numbers of a text in order.
+    """The numbers of a text, in order.
 
-    spans    (m, 2) start and stop byte, sign included
+    spans    (m, 2) start and stop byte, including the sign
     values   (m,) NaN where `broken`
-    broken   (m,) more than one point, no digit, or too large for a double
-    covered  (n,) the bytes that belong to a number
+    broken   (m,) has more than one point, has no digit, or is too large for a double
+    covered  (n,) bytes that belong to a number
     """
 
     spans: Ints
@@ -55,10 +55,10 @@ class Numbers:
 
 
 def find_numbers(text: Bytes, numeric: Mask, fixed: Mask) -> Numbers:
-    """The numbers of `text`.
+    """Find the numbers of `text`.
 
-    numeric  (n,) the bytes that may belong to a number
-    fixed    (256,) a run after one of these characters is no number but belongs to the shape
+    numeric  (n,) bytes that may belong to a number
+    fixed    (256,) characters after which a run is not a number but part of the shape
     """
     runs, covered = runs_of(numeric), numeric.copy()
     heeded = np.flatnonzero((fixed | SIGN | BLANK).take(text.take(runs[:, 0] - 1)))
@@ -79,16 +79,16 @@ def find_numbers(text: Bytes, numeric: Mask, fixed: Mask) -> Numbers:
 
 
 def is_numeric(text: Bytes) -> Mask:
-    """`NUMERIC[text]`, faster: digits and the point stand together in the alphabet, with a stroke between them."""
+    """`NUMERIC[text]`, faster: "." to "9" is a contiguous range of codes that contains only "/" besides."""
     return (text - np.uint8(POINT) < ord("9") - POINT + 1) & (text != ord("/"))
 
 
 SHORT = 64
-"""Stretches up to this long are filled all at once, place by place; the rest of longer ones one by one."""
+"""Leading bytes of spans that are filled for all spans at once; the rest of longer spans is filled one by one."""
 
 
 def fill(cells: NDArray[Any], spans: Ints, value: int) -> None:
-    """Set cells over stretches of them, most of which are short."""
+    """Set `cells` to `value` over spans (k, 2), most of which are short."""
     starts, stops = spans[:, 0].copy(), spans[:, 1]
     for _ in range(SHORT):
         rows = np.flatnonzero(stops > starts)
@@ -104,14 +104,14 @@ def fill(cells: NDArray[Any], spans: Ints, value: int) -> None:
 
 @frozen
 class LastBefore:
-    """The last character before each of some places that is no blank: where it is, and what; 0 at the text's start."""
+    """The last nonblank character before each of some places: where it is, and its code (0: start of the text)."""
 
     places: Ints
     characters: Bytes
 
 
 def last_before(text: Bytes, places: Ints) -> LastBefore:
-    """What stands before `places`, up to `BLANKS` blanks left out (a blank, if there are more)."""
+    """The characters before `places`, skipping up to `BLANKS` blanks (a blank, if there are more)."""
     at = places - 1
     characters = text[np.maximum(at, 0)]
     for _ in range(BLANKS):
@@ -132,11 +132,11 @@ def runs_of(mask: Mask) -> Ints:
 
 
 EIGHT = 8
-"""Bytes that are converted at once, as one whole number; the last ones of a run are its highest."""
+"""Bytes converted at once, as one integer; the last bytes of a run are its most significant ones."""
 
 
 def convert(text: Bytes, runs: Ints) -> tuple[Array, Mask]:
-    """The values of runs of digits and points, exactly rounded; and which are malformed."""
+    """Values (k,) of runs of digits and points, correctly rounded; and a mask (k,) of those that are malformed."""
     found = digits_of(text, runs[:, 0], runs[:, 1])
     values = found.value.astype(np.float64)
     values /= POWERS.take(found.tail)
@@ -152,14 +152,14 @@ def convert(text: Bytes, runs: Ints) -> tuple[Array, Mask]:
 
 
 def in_lanes(text: Bytes) -> NDArray[np.uint64]:
-    """A text, sixteen zero bytes before it and some behind it, as numbers of eight bytes each."""
+    """A text as integers of eight bytes each, with sixteen zero bytes before it and some after it."""
     padded = np.zeros((len(text) // EIGHT + 4) * EIGHT, dtype=np.uint8)
     padded[2 * EIGHT : 2 * EIGHT + len(text)] = text
     return padded.view("<u8")
 
 
 def digits_of(text: Bytes, starts: Ints, stops: Ints, *, valued: bool = True) -> Digits:
-    """What stands in runs of digits and points; of long ones in their last sixteen bytes. See `Digits.of`."""
+    """The digits of runs (of long runs, of their last sixteen bytes). See `Digits.of`."""
     lanes, lengths = in_lanes(text), stops - starts
     found = Digits.of(eight_at(lanes, stops + EIGHT), lengths, valued)
     long = np.flatnonzero(lengths > EIGHT)
@@ -169,7 +169,7 @@ def digits_of(text: Bytes, starts: Ints, stops: Ints, *, valued: bool = True) ->
 
 
 def eight_at(lanes: NDArray[np.uint64], places: Ints) -> NDArray[np.uint64]:
-    """Eight bytes from each of some places on, as one number; `lanes` has them at every eighth place."""
+    """The eight bytes from each of `places` on, as one integer; `lanes` as made by `in_lanes`."""
     lane, over = places >> 3, (places & 7).view(np.uint64)
     over <<= np.uint64(3)
     low = lanes.take(lane)
@@ -182,27 +182,27 @@ def eight_at(lanes: NDArray[np.uint64], places: Ints) -> NDArray[np.uint64]:
 
 
 def repeated(byte: int) -> np.uint64:
-    """Eight bytes alike as one number."""
+    """Eight equal bytes as one integer."""
     return np.uint64(int.from_bytes(bytes([byte]) * EIGHT, "little"))
 
 
 ONES, TOPS, FOURS, POINTS, ZEROS, ABOVE = (repeated(byte) for byte in (0x01, 0x80, 0x0F, POINT, ord("0"), 0x76))
 OWN = np.array([0, *((1 << 64) - (1 << 64 - 8 * count) for count in range(1, EIGHT + 1))], dtype=np.uint64)
-"""The highest so many bytes of eight."""
+"""Masks of the `count` most significant bytes of eight, by `count`."""
 MASKS = {8: 0x00FF00FF00FF00FF, 16: 0x0000FFFF0000FFFF, 32: 0x00000000FFFFFFFF}
-"""Every second group of so many bits."""
+"""Masks of every second group of `bits` bits."""
 POWERS: Array = (10.0 ** np.arange(23)).astype(np.float64)
-"""Those powers of ten that a double holds exactly."""
+"""The powers of ten that are exact doubles."""
 
 
 @frozen
 class Digits:
-    """Up to sixteen characters each, columns.
+    """The digits of runs of up to sixteen characters, as columns.
 
-    value    their digits as a whole number, ten times as large where there is a point; 0 if not asked for
-    tail     how many characters stand from the point on, 0 without one: the value is in units of 10^-tail
-    pointed  there is a point; `several`: there are more
-    pure     there is nothing but digits and points; True where the value was asked for
+    value    the digits as an integer, multiplied by ten if there is a point; 0 if not asked for
+    tail     number of characters from the point to the end, 0 without a point: the value is in units of 10^-tail
+    pointed  whether there is a point; `several`: whether there are more
+    pure     whether there are only digits and points; True if the value was asked for
     """
 
     value: Ints
@@ -213,10 +213,10 @@ class Digits:
 
     @classmethod
     def of(cls, words: NDArray[np.uint64], lengths: Ints, valued: bool) -> Digits:
-        """Of the last `lengths` bytes of words in which the first character is the lowest byte.
+        """The digits in the last `lengths` bytes of words, whose first character is the lowest byte.
 
-        A point shows as the only zero byte when its code is taken from all bytes. `valued`: the words are known to be
-        digits and points, and their value is wanted; else it is looked what they are.
+        After xor with the code of the point, a point is the only zero byte. `valued`: the words are known to be digits
+        and points, and their value is computed; else it is checked that they are.
         """
         own = OWN.take(lengths, mode="clip")
         words &= own
@@ -237,7 +237,7 @@ class Digits:
         return cls(value.view(np.int64), tail, pointed, several, pure)
 
     def put_before(self, rows: Ints, front: Digits) -> None:
-        """Put eight characters before those of some rows."""
+        """Combine with the digits of the eight characters before those of some rows."""
         again = front.pointed & self.pointed[rows]
         first = front.pointed & ~again
         self.value[rows] *= np.where(first, 10, 1)
@@ -249,15 +249,15 @@ class Digits:
 
 
 def others(words: NDArray[np.uint64], own: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """The top bit of each byte of words, among those that are their `own`, that is no digit."""
+    """The top bits of those bytes, within `own`, that are not digits."""
     digits = words ^ ZEROS
     return (((digits & ~TOPS) + ABOVE) | digits) & TOPS & own
 
 
 def whole(words: NDArray[np.uint64], points: NDArray[np.uint64], below: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """The digits of words as whole numbers, those behind the point moved down onto it, and a zero behind them.
+    """The digits of words as integers. Digits after the point are moved onto it, with a zero after them.
 
-    points  the top bit of the byte that is a point, 0 without one; one less is `below`. Both are lost.
+    points  the top bit of the point's byte, 0 without a point; `below` is `points` - 1. Both are overwritten.
     """
     points += below
     behind = np.invert(points, out=points)
@@ -273,9 +273,9 @@ def whole(words: NDArray[np.uint64], points: NDArray[np.uint64], below: NDArray[
 
 
 def summed(value: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Eight digits, one a byte, as a whole number. They are lost.
+    """The integer of eight digits, one per byte; `value` is overwritten.
 
-    They are added in pairs, these in pairs, and these in pairs (Lemire, "Quickly parsing eight digits", 2018).
+    Neighbouring digits are combined to pairs, fours and eights (Lemire, "Quickly parsing eight digits", 2018).
     """
     for bits, weight in ((8, 10), (16, 100), (32, 10_000)):
         value *= np.uint64((weight << bits) + 1)

@@ -1,7 +1,7 @@
-"""Text that a control never gets to: after the tape, after the program, in the bodies of subprograms not called.
+"""Text that a control never reaches: after the tape, after the program, in subprograms that nothing calls.
 
-What follows the end of the tape is not looked at. Elsewhere a line may be anything, and a control does not mind. Such a
-line is kept as opaque text of the kind `UNREAD`; whoever gets to it after all, by a call or a jump, has to refuse it.
+Text after the end of the tape is not parsed. In the other places an unreadable line does not disturb a control; it is
+kept as opaque text of the kind `UNREAD`, and refused if it is reached after all, by a call or a jump.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ncfix.text.tree import Comment, Constant, OWordLine, Skip, Template, Word
 from ncfix.values import frozen, mutable
 
 UNREAD = "unread"
-"""The kind of an `Opaque` that could not be read where nobody may need it."""
+"""Kind of an `Opaque` that could not be parsed and may never be reached."""
 
 CALL = 980
 """M98 in tenths."""
@@ -33,14 +33,14 @@ PROGRAM_ENDS = frozenset({20, 300})
 
 
 LEADER = re.compile(rb"(?:[ \t\r\n]|\([^()\r\n]*+(?:\([^()\r\n]*+\)[^()\r\n]*+)*+\)|;[^\r\n]*)*+")
-"""Blank lines and comments, with brackets in them, too."""
+"""Blank lines and comments, which may contain brackets."""
 
 
 def tape_end(source: bytes, blocks: Ints) -> int:
     """The block with the `%` that ends the tape; the number of blocks if there is none.
 
-    It is the first `%` alone on its line that has something before it. A `%` after nothing but blank lines and
-    comments starts the tape.
+    It is the first `%` alone on its line with something before it. A `%` after only blank lines and comments starts the
+    tape.
     """
     leader = LEADER.match(source, int(blocks[0, 0]))
     assert leader is not None, "it matches nothing, too"
@@ -53,21 +53,21 @@ def tape_end(source: bytes, blocks: Ints) -> int:
 
 
 def whole_text(source: bytes, blocks: Ints) -> int:
-    """As `tape_end` for languages without a mark that ends the text: what stands behind the program's end is read."""
+    """Like `tape_end`, for languages without such a mark: everything after the program's end is parsed."""
     return len(blocks)
 
 
 def runs_straight_on(template: Template) -> bool:
-    """Whether nothing leads from a block of this shape to another part of the text, or from there to it."""
+    """Whether blocks of this shape neither refer to other parts of the text nor are referred to."""
     return not any(isinstance(item, OWordLine) for item in template.items) and CALL not in template.m_codes
 
 
 @frozen
 class Deletable:
-    """What blocks that may be skipped have in common.
+    """Properties of a block shape with block delete.
 
-    switches  of block delete: `/` is one, `/2` another
-    matters   to the path: whether the coolant is on, the control stops or waits leads no axis elsewhere
+    switches  numbers of its block delete switches: `/` is one, `/2` another
+    matters   whether the block can affect the path; coolant, stops and dwells cannot
     """
 
     switches: frozenset[int]
@@ -75,7 +75,7 @@ class Deletable:
 
 
 def deletable(template: Template, dwell: str) -> Deletable | None:
-    """Which switches decide over blocks of this shape, if any; `dwell`: the letters that say with G4 how long."""
+    """The block delete properties of a shape; None without `/`. `dwell`: the letters of G4's duration."""
     switches = frozenset(item.level for item in template.items if isinstance(item, Skip))
     if not switches:
         return None
@@ -89,10 +89,10 @@ def deletable(template: Template, dwell: str) -> Deletable | None:
 
 @mutable
 class Reach:
-    """Follows the blocks of a program in the order written.
+    """Tracks, in the order of the text, whether the control reaches the blocks of a program.
 
-    ended  the program has ended: an M2 or M30 stood outside all o-words
-    open   the keywords and labels of the o-words that are open
+    ended  the program has ended: there was an M2 or M30 outside all o-words
+    open   keywords and labels of the open o-words
     """
 
     ended: bool = False
@@ -100,11 +100,11 @@ class Reach:
 
     @property
     def in_doubt(self) -> bool:
-        """Whether the control may never get to the next block."""
+        """Whether the control may never reach the next block."""
         return self.ended or any(keyword == "sub" for keyword, _ in self.open)
 
     def follow(self, template: Template) -> None:
-        """Take note of a block."""
+        """Process the next block."""
         for item in template.items:
             if isinstance(item, OWordLine):
                 self.enter_or_leave(item)
@@ -112,7 +112,7 @@ class Reach:
             self.ended = True
 
     def enter_or_leave(self, flow: OWordLine) -> None:
-        """Take note of an o-word. `while` closes the `do` of its label; other than that it opens."""
+        """Process an o-word. `while` closes the `do` with the same label; otherwise it opens."""
         if flow.keyword in CLOSING or (flow.keyword == "while" and ("do", flow.label) in self.open):
             labels = [label for _, label in self.open]
             if flow.label in labels:

@@ -1,8 +1,8 @@
-"""Reads a program: from bytes to a `Program`.
+"""Reads a program from bytes to a `Program`.
 
-A scan finds the numbers of all blocks. What is left of a block without them is its shape. The grammar parses each shape
-once; the resulting template serves every block of that shape, with the numbers of the scan. Where scan and grammar do
-not find the same numbers, the block is parsed by itself: its own text is its shape, and its numbers are the grammar's.
+A scan finds the numbers of all blocks. A block without its numbers is its shape. The grammar parses each shape once;
+the resulting template serves every block of that shape, with the numbers of the scan. If scan and grammar find
+different numbers in a block, that block is parsed by itself, and its template is used for its own text only.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from ncfix.text.writer import line_end
 from ncfix.values import mutable
 
 CAPACITY = 5_000
-"""How many shapes and texts of a dialect are remembered; the one that was not used for longest goes first."""
+"""Number of shapes and of texts of a dialect that are cached; the least recently used is dropped first."""
 
 Value = TypeVar("Value")
 
 
 class Memory(Generic[Value]):
-    """Values by key, the least recently used forgotten first."""
+    """A cache of values by key; the least recently used is dropped first."""
 
     def __init__(self) -> None:
         self._values: OrderedDict[bytes, Value] = OrderedDict()
@@ -44,13 +44,13 @@ class Memory(Generic[Value]):
         return len(self._values)
 
     def recall(self, key: bytes) -> Value | None:
-        """The value under `key`, which is now the last to be forgotten."""
+        """The value under `key`, which becomes the most recently used; None if it is not cached."""
         if key in self._values:
             self._values.move_to_end(key)
         return self._values.get(key)
 
     def keep(self, key: bytes, value: Value) -> None:
-        """Remember a value."""
+        """Store a value."""
         self._values[key] = value
         if len(self._values) > CAPACITY:
             self._values.popitem(last=False)
@@ -58,44 +58,44 @@ class Memory(Generic[Value]):
 
 @lru_cache(maxsize=32)
 def shapes_of(dialect: Dialect) -> Memory[Template]:
-    """The templates of the shapes of a dialect that were seen."""
+    """Cache of the templates of a dialect's shapes."""
     return Memory()
 
 
 @lru_cache(maxsize=32)
 def texts_of(dialect: Dialect) -> Memory[Parsed]:
-    """The blocks of a dialect that were parsed one by one."""
+    """Cache of a dialect's blocks that were parsed one by one."""
     return Memory()
 
 
 def parse_block(dialect: Dialect, text: str) -> Parsed:
-    """One block, by the grammar and the rules that a grammar cannot say; raises `BlockError`."""
+    """Parse one block by the grammar and the rules that a grammar cannot express; raises `BlockError`."""
     return language_of(dialect, Language).parse(dialect, text)
 
 
 PART_BYTES = 1 << 22
-"""How much text is scanned at once: more than a part of a long program."""
+"""Number of bytes scanned at once; more than one part of a long program."""
 
 WHOLE_BLOCK = Span(Anchor(START, 0), Anchor(END, 0))
 
 
 def opaque_block(kind: str) -> Parsed:
-    """A block that is passed through whole."""
+    """A block that is passed through as a whole."""
     return Parsed(Template((Opaque(kind, WHOLE_BLOCK),), 0), (), (), -1)
 
 
 ONE_UNSCANNED = Scan([None], np.array([-1]), np.array([0, 0]), np.empty((0, 2), np.int64), np.empty(0))
-"""A part of one block that was not looked at."""
+"""The scan of a single block that was not scanned."""
 
 AFTER_TAPE = opaque_block("after the end of the tape")
 NOT_READ = opaque_block(UNREAD)
 
 
 def read(source: bytes, path: str = "<program>", dialect: Dialect | str | None = None) -> Program:
-    """Read an NC program; `dialect` is found from content and suffix if it is not given.
+    """Read an NC program; without `dialect` it is found from content and suffix.
 
-    Raises SourceError NCF101 to NCF103 if the bytes are no program of that kind, NCF105 to NCF119 with the first line
-    that cannot be read, and UsageError NCF104 for an unknown dialect.
+    Raises SourceError NCF101 to NCF103 if the bytes are no program of that kind, NCF105 to NCF119 for the first line
+    that cannot be parsed, and UsageError NCF104 for an unknown dialect.
     """
     chosen = detect(source, path) if dialect is None else dialect
     known = get(chosen) if isinstance(chosen, str) else chosen
@@ -107,9 +107,9 @@ def read(source: bytes, path: str = "<program>", dialect: Dialect | str | None =
 
 
 def read_like(source: bytes, path: str, like: Program, control: str = "") -> Program:
-    """Read a program in the dialect of another, or in its own if it shows that it is of another family.
+    """Read a program in the dialect of `like`; if that is refused, in the dialect found from its own text.
 
-    What was written out flat may have lost all that shows a dialect. Raises what `read` raises.
+    A flat program may have lost everything that identifies its dialect. Raises what `read` raises.
     """
     try:
         return read(source, path, like.dialect)
@@ -118,7 +118,7 @@ def read_like(source: bytes, path: str, like: Program, control: str = "") -> Pro
 
 
 class PartColumns(NamedTuple):
-    """The columns of a part of a program: the first number of each block, and how many there are; spans and values."""
+    """Columns of a part of a program: first number of each block and the total, spans, values."""
 
     first: Ints
     spans: Ints
@@ -127,15 +127,15 @@ class PartColumns(NamedTuple):
 
 @mutable
 class ProgramReading:
-    """One program while it is being read, part by part.
+    """The state of reading one program, part by part.
 
     tape_end   the block that ends the tape
     templates  the templates found so far
-    index      shape -> its template; for a block without a shape, its text and a line feed
-    rows       the template of each block, as far as blocks are read: `done` of them
-    reach      what follows from the first `followed` blocks; it is only asked where something cannot be read
-    first_line the line of the file on which the text begins
-    line_end   the line end that the file uses first; if not given, that of the text
+    index      shape -> index of its template; a block without a shape is entered by its text and a line feed
+    rows       index of each block's template, for the `done` blocks read so far
+    reach      reachability after the first `followed` blocks; updated only when a block cannot be parsed
+    first_line line number of the file at which the text begins
+    line_end   first line end of the file; if not given, of the text
     """
 
     source: bytes
@@ -177,7 +177,7 @@ class ProgramReading:
         )
 
     def parts(self) -> Iterator[tuple[int, int]]:
-        """First block and the one after the last of each part; a very long line is a part of its own."""
+        """First block of each part and the block after its last; a very long line is a part of its own."""
         first, end = 0, min(self.tape_end + 1, len(self.blocks))
         while first < end:
             limit = self.blocks[first, 0] + PART_BYTES
@@ -197,20 +197,20 @@ class ProgramReading:
         return columns._replace(spans=moved_by(columns.spans, self.blocks[first, 0]))
 
     def tail(self) -> PartColumns:
-        """The blocks after the end of the tape."""
+        """The columns of the blocks after the end of the tape."""
         count = len(self.blocks) - self.done
         if count:
             self.take(np.full(count, self.number(b"\n", AFTER_TAPE.template), dtype=np.int32))
         return PartColumns(np.zeros(count + 1, np.int64), np.empty((0, 2), np.int64), np.empty(0))
 
     def take(self, templates: NDArray[np.int32]) -> None:
-        """Note the templates of the next blocks."""
+        """Record the templates of the next blocks."""
         stop = self.done + len(templates)
         self.rows[self.done : stop] = templates
         self.done = stop
 
     def scan(self, first: int, stop: int) -> Scan:
-        """The shapes and numbers of a part; a line that is too long has no shape."""
+        """The shapes and numbers of a part; a line over the length limit has no shape."""
         blocks = self.blocks[first:stop]
         start, end = blocks[0, 0], blocks[-1, 1] if stop < len(self.blocks) else len(self.source)
         lengths = blocks[:, 1] - blocks[:, 0]
@@ -221,7 +221,7 @@ class ProgramReading:
         return found.setting_apart(np.flatnonzero(lengths > limit).tolist()) if limit else found
 
     def learn(self, first: int, row: int, scan: Scan, exact: dict[int, Parsed]) -> int:
-        """The template of a block whose shape was not known, or that has to be taken as it is: in `exact` then."""
+        """The template index of a block of unknown shape, or of one parsed by itself, which is added to `exact`."""
         shape = scan.shapes[row if scan.group is None else scan.group[row]]
         if shape is not None:
             if shape in self.index:  # from a block further up in this part
@@ -243,14 +243,14 @@ class ProgramReading:
         return self.number(text + b"\n", parsed.template)
 
     def number(self, key: bytes, template: Template) -> int:
-        """The index of a template, which is known by `key` from now on."""
+        """The index of a template, which is entered under `key`."""
         if key not in self.index:
             self.index[key] = len(self.templates)
             self.templates.append(template)
         return self.index[key]
 
     def parsed(self, block: int, text: bytes) -> Parsed:
-        """One block by the grammar; raises SourceError, unless the control may never get there."""
+        """One block parsed by the grammar; raises SourceError, unless the control may never reach it."""
         known, limit = texts_of(self.dialect).recall(text), self.dialect.line_limit
         if known is not None:
             return known
@@ -266,7 +266,7 @@ class ProgramReading:
             raise SourceError.of(fault.code, fault.text, place, fault.hint) from None
 
     def in_doubt(self, block: int) -> bool:
-        """Whether the control may never get to a block."""
+        """Whether the control may never reach a block."""
         for row in self.rows[self.followed : block].tolist():
             self.reach.follow(self.templates[row])
         self.followed = block
@@ -274,19 +274,19 @@ class ProgramReading:
 
 
 def moved_by(places: Ints, offset: int) -> Ints:
-    """Places so many bytes, or numbers, further on; the same array where that is none."""
+    """Places moved by `offset`; the same array if it is zero."""
     return places + offset if offset else places
 
 
 def agrees(scan: Scan, row: int, parsed: Parsed, start: int) -> bool:
-    """Whether the scan saw the same numbers, and the same comment at the end of the block, as the grammar."""
+    """Whether scan and grammar found the same numbers and the same comment at the end of the block."""
     spans = scan.spans[scan.first_number[row] : scan.first_number[row + 1]] - start
     comment = max(scan.comment[row] - start, -1)
     return bool(comment == parsed.comment and np.array_equal(spans, np.reshape(parsed.spans, (-1, 2))))
 
 
 def with_exact(scan: Scan, exact: dict[int, Parsed], starts: Ints) -> PartColumns:
-    """The columns of a scan, where the blocks in `exact` have the grammar's numbers instead of the scan's."""
+    """The columns of a scan, with the grammar's numbers for the blocks in `exact`."""
     if not exact:
         return PartColumns(scan.first_number, scan.spans, scan.values)
     counts = np.diff(scan.first_number)
@@ -302,6 +302,6 @@ def with_exact(scan: Scan, exact: dict[int, Parsed], starts: Ints) -> PartColumn
 
 
 def joined(parts: list[PartColumns]) -> PartColumns:
-    """The columns of parts that follow each other."""
+    """The columns of consecutive parts, joined."""
     counts, spans, values = map(np.concatenate, zip(*((np.diff(each[0]), *each[1:]) for each in parts), strict=True))
     return PartColumns(firsts(counts), spans, values)

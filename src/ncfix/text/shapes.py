@@ -1,7 +1,7 @@
-"""The shapes of a text's blocks: their bytes with every number, and the comment that ends them, replaced by a mark.
+"""The shapes of a text's blocks: their bytes with each number, and the comment that ends them, replaced by a mark.
 
-Blocks of one shape mean the same but for their numbers, so one of them is parsed for all. The scan does not know the
-language: it only says where numbers would be. Whether they are is checked once per shape.
+Blocks of one shape differ in meaning only by their numbers, so one of them is parsed for all. The scan does not know
+the language: it finds possible numbers. Whether they are numbers is checked once per shape.
 """
 
 from __future__ import annotations
@@ -39,31 +39,31 @@ from ncfix.values import frozen
 NUMBER_MARK = 1
 COMMENT_MARK = 2
 POINTLESS_MARK = 3
-"""Of a number without a decimal point, in languages where it means something else than one with."""
+"""Mark of a number without a decimal point, in languages where the point changes the meaning."""
 
 ODD = table(bytes([0, NUMBER_MARK, COMMENT_MARK, POINTLESS_MARK]) + b"\r")
-"""What a block may not hold to have a shape: zero and the marks, and carriage returns, where a comment might end."""
+"""Bytes that a block with a shape cannot contain: zero, the marks, and a carriage return, which might end a comment."""
 
 FIXED = table(b"GgMmOo")
-"""A number after these belongs to the shape: what it selects has a meaning of its own."""
+"""Letters after which a number is part of the shape, because it selects a meaning."""
 
 MAX_RETURNS = 2
-"""How many carriage returns before a line feed belong to the line end."""
+"""Largest number of carriage returns before a line feed that belong to the line end."""
 
 COMMENT = re.compile(rb"(?:\([^()\r\n]*\)|;[^\r\n]*)(?P<last>(?=[ \t]*(?:[\r\n]|\Z)))?")
-"""A comment; group `last` takes part if nothing but blanks follows on the line."""
+"""A comment; its group `last` matches if only blanks follow on the line."""
 
 
 @frozen
 class Scan:
-    """What the scan of a text found, columns over its n blocks and m numbers.
+    """Result of scanning a text with n blocks and m numbers, as columns.
 
-    shapes        n keys: blocks with equal keys have equal shapes; None for a block that must be taken as it is
-    group         (n,) index into `shapes`, if most are given but once; None: one for each block
-    comment       (n,) where the comment that ends the block starts, -1 without one
+    shapes        keys: blocks with equal keys have equal shapes; None for a block that must be parsed by itself
+    group         (n,) index of each block in `shapes`, if most keys are stored only once; None: one key for each block
+    comment       (n,) start of the comment that ends the block; -1 without one
     first_number  (n + 1,) the numbers of block i are first_number[i] : first_number[i + 1]
     spans         (m, 2) start and stop byte of each number
-    values        (m,)
+    values        (m,) value of each number
     """
 
     shapes: list[bytes | None]
@@ -75,7 +75,7 @@ class Scan:
 
     @classmethod
     def of(cls, keys: bytes, blocks: Ints, comment: Ints, numbers: Numbers, apart: set[int]) -> Scan:
-        """Of the keys of all blocks, see `shape_keys`; the blocks `apart` must be taken as they are."""
+        """From the keys of all blocks, see `shape_keys`; the blocks `apart` must be parsed by themselves."""
         shapes: list[bytes | None]
         if apart:
             shapes, group = list(keys.split(b"\n")[: len(blocks)]), None
@@ -89,7 +89,7 @@ class Scan:
 
     @classmethod
     def joined(cls, parts: Sequence[tuple[int, Scan]]) -> Scan:
-        """The scan of a text, from those of what it consists of; each begins at a byte of the text."""
+        """The scan of a text from the scans of its slices, each with its first byte in the text."""
         shapes, comment, counts, spans, group = list[bytes | None](), [], [], [], []
         for at, part in parts:
             comment.append(np.where(part.comment < 0, -1, part.comment + at))
@@ -103,17 +103,17 @@ class Scan:
 
     @property
     def groups(self) -> Ints:
-        """(n,) which of the shapes each block has."""
+        """(n,) index of each block's shape."""
         return np.arange(len(self.comment)) if self.group is None else self.group
 
     def expanded(self) -> Scan:
-        """This scan with a shape for each block."""
+        """This scan with one shape for each block."""
         if self.group is None:
             return self
         return replace(self, shapes=[self.shapes[index] for index in self.group.tolist()], group=None)
 
     def setting_apart(self, blocks: Sequence[int]) -> Scan:
-        """This scan, where some blocks must be taken as they are."""
+        """This scan with the given blocks marked as to be parsed by themselves."""
         if not len(blocks):
             return self
         found = self.expanded()
@@ -124,10 +124,10 @@ class Scan:
 
 
 def split_blocks(source: bytes) -> Ints:
-    """Start and stop byte of each line, shape (n, 2), line ends not included.
+    """Start and stop byte of each line, shape (n, 2), without line ends.
 
-    A line ends with LF, CR LF, or CR CR LF (which some transfers leave); with CR alone only in a text
-    that has no LF. Text after the last line end is a line.
+    A line ends with LF, CR LF, or CR CR LF (left by some transfers); with a single CR only if the text has no LF. Text
+    after the last line end is a line.
     """
     text = np.frombuffer(source, dtype=np.uint8)
     ends = np.flatnonzero(text == ord("\n"))
@@ -153,18 +153,18 @@ def scan(source: bytes, blocks: Ints, *, pointless: bool = False) -> Scan:
 
 
 SLICE_BYTES = 1 << 19
-"""How much of a text of any kind is scanned at once: the columns take about a hundred times as much."""
+"""Number of bytes scanned at once in numpy: the columns take about a hundred times as much memory."""
 
 UNTOUCHED, CRAMPED = -1, -2
-"""What the compiled scan answers: there is a block that must be taken as it is, or more than there is room for."""
+"""Results of the compiled scan: some block must be parsed by itself, or the arrays are too small."""
 SPARE, DENSE, VARIED = 1 << 12, 5, 16
-"""What room there is at first: for so many numbers and characters of different shapes, and for one in so many bytes."""
+"""Initial sizes of its arrays: a constant part, and one number or one row of a shape for so many bytes."""
 
 PlainScan = Callable[[bytes, Ints], Scan]
 
 
 def in_slices(source: bytes, blocks: Ints, scan: PlainScan) -> Scan:
-    """What `scan` makes of a text, a slice of it at a time."""
+    """Apply `scan` to a text slice by slice."""
     begins = set(np.searchsorted(blocks[:, 0], np.arange(0, len(source), SLICE_BYTES)).tolist())
     if len(source) <= SLICE_BYTES or len(begins) == 1:
         return scan(source, blocks)
@@ -176,7 +176,7 @@ def in_slices(source: bytes, blocks: Ints, scan: PlainScan) -> Scan:
 
 
 def scan_any(source: bytes, blocks: Ints, pointless: bool) -> Scan:
-    """As `scan`, of any text, with numpy alone."""
+    """Like `scan`, but in numpy and for any text."""
     found = [(*match.span(), match.start("last") >= 0) for match in matches(COMMENT, source, b"(;")]
     comments = np.array(found, dtype=np.int64).reshape(-1, 3)
     final = comments[comments[:, 2] != 0, :2]
@@ -194,14 +194,14 @@ def scan_beside(
     apart: Iterable[int] = (),
     pointless: bool = False,
 ) -> Scan:
-    """The numbers and shapes of a text, whose language says where there are none.
+    """The numbers and shapes of a text; the language says where there are no numbers.
 
-    silent     (k, 2) start and stop of what holds no numbers: comments, strings
-    final      (m, 2) those of comments that end their block
-    fixed      (256,) bytes behind which a number belongs to the shape
+    silent     (k, 2) start and stop of text without numbers: comments, strings
+    final      (m, 2) start and stop of comments that end their block
+    fixed      (256,) bytes after which a number belongs to the shape
     named      (n,) digits that belong to names; None: none do
-    apart      blocks that must be taken as they are, besides those that hold what no shape can
-    pointless  numbers without a point make another shape
+    apart      blocks that must be parsed by themselves, besides those that cannot have a shape
+    pointless  whether numbers without a point make another shape
     """
     numeric = is_numeric(text)
     if named is not None:
@@ -226,11 +226,11 @@ def scan_compiled(
     fixed: Mask = FIXED,
     odd: Mask = ODD,
 ) -> Scan | None:
-    """As `scan`, compiled; None where there are blocks that must be taken as they are.
+    """Like `scan`, compiled; None if some block must be parsed by itself.
 
-    comments  the characters with which comments begin
-    fixed     a number after these belongs to the shape
-    odd       bytes that a block may not hold
+    comments  characters that begin comments
+    fixed     characters after which a number belongs to the shape
+    odd       bytes that a block must not contain
     """
     from ncfix.core import scan as loop
 
@@ -279,23 +279,23 @@ def odd_blocks(text: Bytes, blocks: Ints) -> list[int]:
 
 
 def blocks_at(blocks: Ints, places: Ints) -> list[int]:
-    """The blocks in which places (k,) lie; those behind a block, at its line end, do not count."""
+    """The blocks in which places (k,) lie; places in line ends are dropped."""
     owner = block_of(blocks, places)
     return owner[places < blocks[owner, 1]].tolist()
 
 
 def firsts(counts: Ints) -> Ints:
-    """The first number of each block (n,) with so many of them, and how many there are, (n + 1,)."""
+    """Index of the first number of each block, and the total, (n + 1,), from the counts of each block (n,)."""
     return np.concatenate(([0], np.cumsum(counts)))
 
 
 def block_of(blocks: Ints, places: Ints) -> Ints:
-    """The blocks in which some bytes of the text stand; those of a line end stand in the block before it."""
+    """The block of each byte position; a line end belongs to the block before it."""
     return np.searchsorted(blocks[:, 0], places, side="right") - 1
 
 
 def matches(pattern: re.Pattern[bytes], source: bytes, heads: bytes) -> Iterator[re.Match[bytes]]:
-    """As `pattern.finditer`, if all it may find begins with one of a few characters: sought where these are alone."""
+    """Like `pattern.finditer`, but faster, for a pattern whose matches all begin with one of the bytes `heads`."""
     text = np.frombuffer(source, dtype=np.uint8)
     begins = reduce(np.logical_or, [text == head for head in heads if head in source] or [np.empty(0, np.bool_)])
     done = 0
@@ -314,9 +314,9 @@ def shape_keys(
     marks: Bytes,
     covered: Mask,
 ) -> bytes:
-    """The key of each block and a line feed: its bytes, with one mark for each number and for the comment at its end.
+    """The keys of all blocks, each with a line feed: the block with a mark for each number and its final comment.
 
-    covered  (n,) the bytes that belong to numbers
+    covered  (n,) bytes that belong to numbers
     """
     marked = np.empty(len(text) + 1, dtype=np.uint8)
     np.bitwise_and(text, covered.view(np.uint8) - np.uint8(1), out=marked[:-1])  # zero is what goes
@@ -328,15 +328,15 @@ def shape_keys(
 
 
 LONG = 8 * EIGHT
-"""Longer keys are not compared with others."""
+"""Largest length of keys that are compared with others."""
 KINDS = 16
-"""So many of the different keys are sought among all others; the rest are rare."""
+"""Number of different keys that are searched for among all others; further ones are assumed to be rare."""
 
 
 def distinct(keys: bytes) -> tuple[list[bytes | None], Ints]:
-    """The different ones of some keys, each with a line feed; rare ones more than once. And which one each of them is.
+    """The different keys among `keys` (rare ones may be repeated), and for each key its index among them.
 
-    They are compared eight characters at a time, from the last one on.
+    In `keys` each is followed by a line feed. They are compared eight characters at a time, from the end.
     """
     padded = np.zeros((len(keys) + LONG) // EIGHT * EIGHT + 2 * EIGHT, dtype=np.uint8)
     padded[LONG : LONG + len(keys)] = np.frombuffer(keys, dtype=np.uint8)
@@ -359,6 +359,6 @@ def distinct(keys: bytes) -> tuple[list[bytes | None], Ints]:
 
 
 def without_point(text: Bytes, numbers: Ints) -> Mask:
-    """Which numbers have no decimal point, (m,)."""
+    """(m,) whether each number has no decimal point."""
     points = np.concatenate(([0], np.cumsum(text == POINT)))
     return np.asarray(points[numbers[:, 1]] == points[numbers[:, 0]])

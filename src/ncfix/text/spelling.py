@@ -1,10 +1,10 @@
-"""How numbers are spelled: one in the manner of the one that it replaces, or a new one as the control writes them.
+"""Spelling of numbers: in the style of the number that is replaced, or as new numbers are written for the control.
 
-One rule for all output: a value is printed with a fixed number of decimals, correctly rounded from the double
-(an exact half goes to the even digit, as the C library does), and minus zero is zero where a number is rewritten.
+One rule for all output: a value is printed with a fixed number of decimals, correctly rounded from the double (an
+exact half goes to the even digit, as in the C library). A rewritten number is never a minus zero.
 
-Many numbers are written as columns, byte for byte the same. A value that lies so close to the middle between two
-outputs that a product of doubles cannot tell which of them is nearer is marked, and written by itself.
+Many numbers are written as columns, with identical bytes. A value so close to the middle between two outputs that a
+product of doubles cannot decide which is nearer is marked, and written by itself.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def value_of(text: str) -> float:
 
 
 def decimals_for(step: float) -> int:
-    """How many decimals the control's least increment needs: 0.001 -> 3, 0.0005 -> 4, 1/25400 -> 5.
+    """Number of decimals that the least increment of a control needs: 0.001 -> 3, 0.0005 -> 4, 1/25400 -> 5.
 
     `step` is in the unit of the word.
     """
@@ -40,13 +40,13 @@ def decimals_for(step: float) -> int:
 
 @frozen(kw_only=True)
 class NumberStyle:
-    """The manner of one written number.
+    """The style of one written number.
 
     decimals       digits after the point
-    point          a decimal point is written even when no digit follows it
-    plus           a plus sign is written
-    leading_zero   a zero is written before the point of numbers below one
-    width          digits before the point, where they were padded with zeros (`X007.5` -> 3), else 0
+    point          whether there is a decimal point even without digits after it
+    plus           whether there is a plus sign
+    leading_zero   whether numbers below one have a zero before the point
+    width          number of digits before the point, if padded with zeros (`X007.5` -> 3), else 0
     """
 
     decimals: int = 0
@@ -88,17 +88,17 @@ class NumberStyle:
 
 @frozen
 class Spelling:
-    """How a control, or one program for it, spells what is put into a program.
+    """How a control, or one program for it, spells text that is inserted into a program.
 
-    signed  numbers have a sign, plus as well
+    signed  numbers have a sign, also plus
     comma   numbers have a decimal comma
-    point   a number in the place of a formula has a point even when it is whole
-    trimmed  such a number has no zeros at its end
-    modal   whether axis words are increments is a mode; else only a word itself says so
-    all_blanks  a word that is taken out takes all blanks before it along, not one
-    vector  the addresses of the direction of the tool, each with what stands before its number; empty: it has none
-    vector_digits  digits behind the point of a component of a unit vector, at least: 1e-6 rad is 6e-5 degrees
-    vector_length  a direction keeps the length that it was programmed with; else it is a unit vector
+    point   a number that replaces an expression has a point even if it is whole
+    trimmed  such a number has no trailing zeros
+    modal   whether increments are a mode; else only a word itself says that it is an increment
+    all_blanks  removing a word removes all blanks before it, not just one
+    vector  addresses of the tool direction, each with the text before its number; empty: there are none
+    vector_digits  smallest number of decimals of a unit vector's component: 1e-6 rad is 6e-5 degrees
+    vector_length  a direction keeps its programmed length; else it is written as a unit vector
     """
 
     signed: bool = False
@@ -119,15 +119,15 @@ class Spelling:
         return self._marked(text if text.strip("+-0.") else text.replace("-", "+"), comma=self.comma)
 
     def short(self, value: float, decimals: int) -> str:
-        """A number without zeros at its end: `12.34`, `12.`."""
+        """A number without trailing zeros: `12.34`, `12.`."""
         return self._marked(NumberStyle(point=self.point, plus=self.signed).write(value, decimals), comma=self.comma)
 
     def instead(self, value: float, decimals: int) -> str:
-        """A number in the place of a formula."""
+        """A number that replaces an expression."""
         return self.short(value, decimals) if self.trimmed else self.number(value, decimals)
 
     def like(self, was: str, value: float, decimals: int) -> str:
-        """A number in place of another one, in its manner; where numbers are signed, what had a sign keeps one."""
+        """A number that replaces another one, in its style; if numbers are signed, one that had a sign keeps a sign."""
         style = NumberStyle.of(was.replace(",", "."))
         if self.signed and was.strip()[:1] == "-":
             style = replace(style, plus=True)
@@ -139,28 +139,28 @@ class Spelling:
 
 
 MOST_DECIMALS = 9
-"""Decimals that are written in bulk; a number with more goes one by one."""
+"""Largest number of decimals written in bulk; a number with more is written by itself."""
 LONGEST = 2 * EIGHT
-"""Bytes, but for its sign, of the longest number that is rewritten in bulk."""
+"""Largest number of bytes, without the sign, of a number that is rewritten in bulk."""
 LARGEST = 1e9
-"""Values of that many output steps go one by one: their products with powers of ten are not exact enough."""
+"""Output steps from which on values are written by themselves: their products with powers of ten are too inexact."""
 TIE = 1e-14
-"""So close to the middle between two outputs, as a share of it, a value counts as on it; a hundred times the rounding
-of a product of doubles."""
+"""Relative distance from the middle between two outputs within which a value counts as on it; a hundred times the
+rounding error of a product of doubles."""
 ROUNDED = 1.01
-"""Half output steps by which an axis may stand off its place for nothing but rounding."""
+"""Largest distance from its position, in half output steps, by which rounding alone can displace an axis."""
 
 ZERO, MINUS, PLUS = ord("0"), ord("-"), ord("+")
 
 
 def rules() -> NumberRules:
-    """These numbers, as the core takes them."""
+    """These limits, in the form that the core takes."""
     return core.loops("words").NumberRules(POWERS, LONGEST, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
 
 
 @frozen
 class Styles:
-    """The manner of m numbers, as in `NumberStyle`; `clear` (m,): nothing but a sign, digits and a point."""
+    """The styles of m numbers, as in `NumberStyle`; `clear` (m,): sign, digits and a point only, not too many."""
 
     decimals: Ints
     point: Mask
@@ -170,12 +170,12 @@ class Styles:
     clear: Mask
 
     def rows(self, rows: Ints) -> Styles:
-        """Some of them."""
+        """The styles of some of the numbers."""
         return Styles(*(getattr(self, name).take(rows) for name in self.__dataclass_fields__))
 
 
 def styles_of(text: Bytes, spans: Ints, *, signed: bool = False) -> Styles:
-    """The styles of the numbers at `spans` (m, 2); `signed`: what had a sign keeps one, whichever."""
+    """The styles of the numbers at `spans` (m, 2); `signed`: a number that had a sign keeps one."""
     low, high = (int(spans[:, 0].min()), int(spans[:, 1].max())) if len(spans) else (0, 0)
     text, spans = text[low:high], spans - low
     starts, stops = spans[:, 0], spans[:, 1]
@@ -196,14 +196,14 @@ def styles_of(text: Bytes, spans: Ints, *, signed: bool = False) -> Styles:
 
 @frozen
 class NumberColumns:
-    """How m numbers are to be written, columns.
+    """Instructions for writing m numbers, as columns.
 
-    heads     four bytes that stand before each, as one number; a zero byte for none
-    sign      a character, 0 for none
-    steps     its size in units of 10^-decimals
-    decimals  digits behind the point
-    least     digits before the point that there are at least
-    point     a point is written
+    heads     four bytes before each number, as one integer; zero bytes are left out
+    sign      a character; 0: none
+    steps     the absolute value in units of 10^-decimals
+    decimals  digits after the point
+    least     smallest number of digits before the point
+    point     whether a point is written
     """
 
     heads: NDArray[np.uint32]
@@ -214,21 +214,21 @@ class NumberColumns:
     point: Mask
 
     def and_then(self, other: NumberColumns, order: Ints) -> NumberColumns:
-        """These numbers and others behind them, all put in an order."""
+        """These numbers followed by others, reordered by `order`."""
         names = self.__dataclass_fields__
         return NumberColumns(*(np.concatenate((getattr(self, k), getattr(other, k))).take(order) for k in names))
 
 
 @frozen
 class Texts:
-    """Numbers as text: their bytes, one number after the other, and how many each of them takes, (m,)."""
+    """Numbers as text: the bytes of all numbers in sequence, and the number of bytes of each, (m,)."""
 
     data: bytes
     length: Ints
 
 
 def is_plain(values: Array, decimals: Ints) -> Mask:
-    """Which of values (n,) can be written in bulk with `decimals` (n,): not too large, clearly nearer to one output."""
+    """(n,) whether values can be written in bulk with `decimals` (n,): neither too large nor between two outputs."""
     with np.errstate(invalid="ignore"):
         steps = np.abs(values) * POWERS.take(decimals)
         off = np.abs(steps - np.floor(steps) - 0.5)
@@ -237,13 +237,13 @@ def is_plain(values: Array, decimals: Ints) -> Mask:
 
 
 def rounded(values: Array, decimals: Ints | int) -> Array:
-    """What a reader makes of values (n,) written with so many decimals (for those that are `is_plain`)."""
+    """The values (n,) as read back after writing with so many decimals; for values that are `is_plain`."""
     scale = POWERS.take(decimals)
     return np.rint(values * scale) / scale + 0.0
 
 
 def in_style(values: Array, styles: Styles, decimals: Ints) -> NumberColumns:
-    """Values in the styles of written numbers, as `NumberStyle.write` does it; all `is_plain`, all `clear`."""
+    """Values in the styles of written numbers, like `NumberStyle.write`; all must be `is_plain` and `clear`."""
     places = np.maximum(decimals, styles.decimals)
     steps = _steps(values, places)
     rows = np.flatnonzero(places > styles.decimals)
@@ -258,10 +258,10 @@ def in_style(values: Array, styles: Styles, decimals: Ints) -> NumberColumns:
 
 
 def plain(values: Array, decimals: Ints, heads: Bytes, *, signed: bool = False) -> NumberColumns:
-    """Values with exactly so many decimals, as `f"{value:.{decimals}f}"` does it; all `is_plain`.
+    """Values with exactly so many decimals, as by `f"{value:.{decimals}f}"`; all must be `is_plain`.
 
-    heads   (m, 4) bytes to put before each, 0 for none
-    signed  with a plus sign, too, which zero has as well
+    heads   (m, 4) bytes to put before each number, 0 for none
+    signed  with a sign in any case, zero with a plus
     """
     steps = _steps(values, decimals)
     negative = (values < 0) & (steps != 0) if signed else np.signbit(values)
@@ -272,12 +272,12 @@ def plain(values: Array, decimals: Ints, heads: Bytes, *, signed: bool = False) 
 
 
 def _steps(values: Array, decimals: Ints) -> NDArray[np.uint32]:
-    """How many output steps values are, the sign left out; all less than `LARGEST`."""
+    """The absolute values in output steps; all less than `LARGEST`."""
     return np.rint(np.abs(values) * POWERS.take(decimals)).astype(np.uint32)
 
 
 def laid_out(numbers: NumberColumns) -> Texts:
-    """Numbers as text: what stands before, sign, digits, point and decimals in columns, and zero where nothing is."""
+    """The numbers as text: columns of heads, signs, digits, points and decimals, without their zero bytes."""
     decimals, most = numbers.decimals, int(numbers.decimals.max(initial=0))
     if int(decimals.min(initial=most)) == most:
         decimals = np.array(most)  # numpy divides by one number much faster than by many
@@ -300,7 +300,7 @@ def laid_out(numbers: NumberColumns) -> Texts:
 
 
 def _digits(values: NDArray[Any]) -> Ints:
-    """How many digits whole numbers have; 0 has none."""
+    """Number of digits of whole numbers; 0 has none."""
     found = np.zeros(len(values), dtype=np.int64)
     for place in range(len(str(int(values.max(initial=0))))):
         found += values >= TENS[place]
@@ -310,14 +310,14 @@ def _digits(values: NDArray[Any]) -> Ints:
 TENS = 10 ** np.arange(19)
 QUAD = 4
 QUADS = (np.arange(10_000)[:, None] // (1000, 100, 10, 1) % 10 + ZERO).astype(np.uint8).view(np.uint32).ravel()
-"""The numbers of four digits as text, each as one number."""
+"""The numbers 0000 to 9999 as text, each as one integer."""
 FIRST = (np.tri(QUAD + 1, QUAD, -1) * 0xFF).astype(np.uint8).view(np.uint32).ravel()
 LAST = (np.tri(QUAD + 1, QUAD, -1) * 0xFF).astype(np.uint8)[:, ::-1].copy().view(np.uint32).ravel()
-"""What leaves of four characters the first so many, or the last so many."""
+"""Masks that keep the first `count`, or the last `count`, of four characters."""
 
 
 def _in_quads(values: NDArray[Any], digits: int) -> list[NDArray[np.uint32]]:
-    """Whole numbers of up to so many digits as text, four characters each."""
+    """Whole numbers of up to `digits` digits as text, in columns of four characters."""
     quads: list[NDArray[np.uint32]] = []
     for _ in range(-(-digits // QUAD)):
         above = values // 10_000
@@ -327,7 +327,7 @@ def _in_quads(values: NDArray[Any], digits: int) -> list[NDArray[np.uint32]]:
 
 
 def without_zeros(columns: list[NDArray[Any]]) -> bytes:
-    """The bytes of columns, row by row, but for zeros."""
+    """The bytes of the columns row by row, without zero bytes."""
     cells = np.empty((len(columns[0]), sum(column.itemsize for column in columns)), dtype=np.uint8)
     at = 0
     for column in columns:

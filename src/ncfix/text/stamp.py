@@ -1,4 +1,4 @@
-"""The mark that a corrected program carries, so that it is not corrected twice."""
+"""The stamp: the comment by which a corrected program is recognised, so that it is not corrected twice."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from ncfix.diagnostics import Message, Place
 from ncfix.text.tree import Comment, Opaque, OWordLine, Program, Tape, Word
 from ncfix.text.writer import Edit
 
-#: How every stamp begins; what follows it is for people.
+#: The beginning of every stamp; the rest is for people.
 SIGN = re.compile(r"\bncfix \d+\.\d+\S* machine ", re.IGNORECASE)
 
 MANY = 100
-"""Comments; to look for the name in the whole text takes less time than to look at so many."""
+"""Number of comments above which searching the whole text is faster than examining each comment."""
 
 
 def find(program: Program) -> int | None:
-    """The block that carries a stamp, or None."""
+    """The block with the stamp; None without one."""
     carriers = [any(isinstance(item, (Comment, Opaque)) for item in each.items) for each in program.templates]
     blocks = np.flatnonzero(np.array(carriers)[program.template])
     if len(blocks) > MANY and b"ncfix" not in program.source.lower():
@@ -31,13 +31,13 @@ def find(program: Program) -> int | None:
 
 
 def remark(place: Place) -> Message:
-    """What is said of a program with a stamp whose numbers are to be what is meant: NCF430."""
+    """The warning NCF430: the program has a stamp, and its corrected numbers are taken as the intended ones."""
     text = "the program has been corrected already, and its corrected numbers are taken for what is meant"
     return Message("NCF430", text, place, "give the original program")
 
 
 def insertion(program: Program, text: str) -> Edit:
-    """The edit that puts the stamp where the dialect allows: after `%` and the program's number, before all else."""
+    """The edit that inserts the stamp at the first place allowed: after `%` and the program's number or name."""
     words = text.upper() if program.dialect.upper_case else text
     comment = program.dialect.comment.format(words.replace("(", "[").replace(")", "]"))
     before = 0
@@ -56,7 +56,7 @@ def insertion(program: Program, text: str) -> Edit:
 
 
 def _is_head(program: Program, block: int) -> bool:
-    """A tape mark, program number or program name: what must stay in front."""
+    """Whether a block is a tape mark, a program number or a program name, which must stay in front."""
     heads = 0
     for item in program.items_of(block):
         match item:

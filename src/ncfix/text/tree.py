@@ -1,13 +1,13 @@
 """The lossless tree of an NC program: blocks as spans of the source, their words as shared templates.
 
-A program has many blocks and few *shapes*: a shape is the text of a block with its numbers replaced. One `Template`
-is kept per shape, made from the Lark tree of the first block that had it; a block is a reference to its template plus
-the places and values of its own numbers, held in arrays. The source bytes are kept as they came, so whatever is not
-edited goes out as it came in.
+A program has many blocks and few *shapes*: a shape is the text of a block with its numbers replaced. There is one
+`Template` per shape, made from the Lark tree of its first block. A block is a reference to its template, with the
+positions and values of its own numbers in arrays. The source bytes are kept unchanged, so whatever is not edited is
+written exactly as it was read.
 
-Places inside a block are given by `Anchor`: so many bytes after the end of the block's number `slot`
-(slot -1: after the start of the block; slot -2: after its end, with an offset that is zero or negative). They hold for
-every block of the shape, however long its numbers are, and however long the comment that ends it.
+A place inside a block is an `Anchor`: a number of bytes after the end of the block's number `slot` (slot -1: after the
+start of the block; slot -2: after its end, with an offset of zero or less). It is valid for every block of the shape,
+whatever the lengths of its numbers and of its final comment.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 
 START = -1
-"""The slot of anchors that count from the start of the block."""
+"""Slot of anchors relative to the start of the block."""
 
 END = -2
-"""The slot of anchors that count from the end of the block."""
+"""Slot of anchors relative to the end of the block."""
 
 
 class Anchor(NamedTuple):
@@ -42,7 +42,7 @@ class Anchor(NamedTuple):
 
 
 class Span(NamedTuple):
-    """A stretch of a block, from `start` up to `stop`."""
+    """A range of a block, from `start` up to `stop`."""
 
     start: Anchor
     stop: Anchor
@@ -55,8 +55,8 @@ class Span(NamedTuple):
 class Literal:
     """A number written in the block: the value of number `slot` of the block.
 
-    `pointless`: it has no decimal point, in a language where that matters: there the value of an axis word may count
-    least increments, and `numbers` holds it as it is written.
+    `pointless`: it has no decimal point, in a language where that changes its meaning: the value of an axis word may
+    then count least increments. `Program.numbers` holds it as written.
     """
 
     slot: int
@@ -65,7 +65,7 @@ class Literal:
 
 @frozen
 class Constant:
-    """A number that every block of the shape has: a plain, unsigned number after G or M."""
+    """A number that is the same in every block of the shape: a plain, unsigned number after G or M."""
 
     value: float
 
@@ -117,9 +117,9 @@ class StringLiteral:
 
 @frozen
 class FunctionCall:
-    """A name with something in brackets, lower case: a function, `SIN(R1)`, or an element of an array, `BORE[2]`.
+    """A name with arguments in brackets, lower case: a function, `SIN(R1)`, or an element of an array, `BORE[2]`.
 
-    An argument that is left out is None. `indexed`: the brackets are square.
+    An omitted argument is None. `indexed`: the brackets are square.
     """
 
     name: str
@@ -139,7 +139,7 @@ Expression = (
 class Word:
     """An address with its value, `X12.5`, `G[#1]`; the address in upper case. `value_span` covers the value only.
 
-    The value is a `Literal` or `Constant` only where a plain number is written: `X[4]` is `+4`, a `Unary`.
+    The value is a `Literal` or `Constant` only if a plain number is written: `X[4]` is `+4`, a `Unary`.
     """
 
     address: str
@@ -159,9 +159,9 @@ class Assignment:
 
 @frozen
 class Command:
-    """A name that stands for itself or takes arguments in brackets, lower case: `SUPA`, `CYCLE81(10,0,2,-5)`.
+    """A name that stands alone or has arguments in brackets, lower case: `SUPA`, `CYCLE81(10,0,2,-5)`.
 
-    An argument that is left out is None. `called`: brackets are written, if only empty ones.
+    An omitted argument is None. `called`: there are brackets, perhaps empty ones.
     """
 
     name: str
@@ -179,7 +179,7 @@ class Comment:
 
 @frozen
 class Skip:
-    """Block skip `/` with its level: if none is written, the first there is (0 on SINUMERIK, else 1)."""
+    """Block skip `/` with its level; without a number, the lowest level (0 on SINUMERIK, else 1)."""
 
     level: int
     span: Span
@@ -209,7 +209,7 @@ class Tape:
 
 @frozen
 class Opaque:
-    """Text that is understood to mean no motion and is passed through: program names, text after the end, ..."""
+    """Text that is known to cause no motion and is passed through: program names, text after the end, ..."""
 
     kind: str
     span: Span
@@ -219,18 +219,18 @@ Item = Word | Assignment | Command | Comment | Skip | OWordLine | Tape | Opaque
 
 
 BEYOND = 1e9
-"""A G or M code with a larger number is none, and all such are the same."""
+"""Largest number of a G or M code; all larger ones are invalid and treated alike."""
 
 
 @frozen
 class Template:
-    """What every block of one shape has in common.
+    """What all blocks of one shape have in common.
 
-    items      what the block consists of, in the order written
-    n_numbers  how many numbers it has; `Literal.slot` and `Anchor.slot` count them from 0
+    items      the items of the block, in the order written
+    n_numbers  the number of its numbers; `Literal.slot` and `Anchor.slot` count them from 0
     g_codes    the constant G codes in tenths (G1 is 10, G38.2 is 382), in the order written
     m_codes    the constant M codes in tenths, in the order written
-    slots      address -> slot, of the words with a plain number; not for G and M, which may stand several times
+    slots      address -> slot, for words with a plain number; without G and M, which may occur several times
     """
 
     items: tuple[Item, ...]
@@ -262,17 +262,17 @@ class Template:
 class Program:
     """An NC program, lossless. One row per block (a line of the source, or several where the dialect continues lines).
 
-    source        the bytes as read; `program.source` is the program
-    path          as the user wrote it, for messages
-    dialect       the dialect it was read with
-    templates     the shapes that occur
+    source        the bytes as read
+    path          as given by the user, for messages
+    dialect       the dialect it was read in
+    templates     the templates of its shapes
     template      (n,) index into `templates`
-    blocks        (n, 2) start and stop byte of each block, line end not included
+    blocks        (n, 2) start and stop byte of each block, without the line end
     first_number  (n + 1,) the numbers of block i are first_number[i] : first_number[i + 1]
-    number_spans  (m, 2) start and stop byte of each number in the source, sign included
+    number_spans  (m, 2) start and stop byte of each number in the source, including the sign
     numbers       (m,) their values as written (in the program's units)
-    first_line    the line of the file on which `source` begins, where that is a part of it
-    line_end      the line end that the file uses first, which that of new lines is, too
+    first_line    line number of the file at which `source` begins, if it is a part of the file
+    line_end      first line end of the file, which is also used for new lines
     """
 
     source: bytes
@@ -292,12 +292,12 @@ class Program:
         return len(self.template)
 
     def text_of(self, block: int) -> str:
-        """The text of a block, as Latin-1 (one character per byte)."""
+        """The text of a block, decoded as Latin-1 (one character per byte)."""
         start, stop = self.blocks[block]
         return self.source[start:stop].decode("latin-1")
 
     def template_of(self, block: int) -> Template:
-        """What the shape of a block means."""
+        """The template of a block."""
         return self.templates[int(self.template[block])]
 
     def items_of(self, block: int) -> tuple[Item, ...]:
@@ -309,7 +309,7 @@ class Program:
         return self.numbers[self.first_number[block] : self.first_number[block + 1]]
 
     def column(self, address: str) -> Array:
-        """The plain numbers after an address, (n,), one for each block; NaN where there is none, or not a plain one."""
+        """The plain number after an address in each block, (n,); NaN if there is none, or no plain one."""
         slot = np.array([template.slots.get(address, -1) for template in self.templates], dtype=np.int64)[self.template]
         values = np.full(len(self), np.nan)
         rows = np.flatnonzero(slot >= 0)
@@ -317,7 +317,7 @@ class Program:
         return values
 
     def position(self, block: int, anchor: Anchor) -> int:
-        """The byte of the source that an anchor of this block stands for."""
+        """The byte of the source at an anchor of this block."""
         if anchor.slot < 0:
             return int(self.blocks[block, 0 if anchor.slot == START else 1]) + anchor.offset
         return int(self.number_spans[self.first_number[block] + anchor.slot, 1]) + anchor.offset
@@ -327,38 +327,38 @@ class Program:
         return self.position(block, span.start), self.position(block, span.stop)
 
     def slice(self, block: int, span: Span) -> str:
-        """The text of a span of this block, as Latin-1."""
+        """The text of a span of this block, decoded as Latin-1."""
         start, stop = self.span(block, span)
         return self.source[start:stop].decode("latin-1")
 
     @property
     def lines_ended(self) -> int:
-        """How many lines of the text have an end; blocks may go over several. Counted once."""
+        """Number of line ends in the text, counted once; a block may have several."""
         if self._lines_ended < 0:
             object.__setattr__(self, "_lines_ended", _counted(self.source, "\n"))
         return self._lines_ended
 
     def line(self, block: int) -> int:
-        """The line number (from 1) on which the block starts."""
+        """The line number (from 1) at which the block starts."""
         if self.lines_ended + (not self.source.endswith(b"\n")) == len(self.blocks):
             return self.first_line + block  # each block is a line
         character = "\n" if b"\n" in self.source else "\r"
         return self.first_line + self.lines_ended_before(int(self.blocks[block, 0]), character)
 
     def lines_ended_before(self, stop: int, character: str = "\n") -> int:
-        """How many lines end before a byte."""
+        """Number of line ends before a byte."""
         if character == "\n" and 2 * stop > len(self.source):
             return self.lines_ended - _counted(self.source, character, stop)
         return _counted(self.source, character, 0, stop)
 
     def lines(self, blocks: NDArray[np.integer[Any]]) -> Ints:
-        """The line numbers on which blocks (n,) start, all at once."""
+        """The line numbers at which blocks (n,) start."""
         text = np.frombuffer(self.source, dtype=np.uint8)
         ends = np.flatnonzero(text == ord("\n" if b"\n" in self.source else "\r"))
         return self.first_line + np.searchsorted(ends, self.blocks[blocks, 0])
 
     def place(self, block: int, span: Span | None = None) -> Place:
-        """Where a block, or a span of it, stands in the file: for messages."""
+        """The place of a block, or of a span of it, in the file: for messages."""
         column = 0
         if span is not None:
             column = self.position(block, span.start) - int(self.blocks[block, 0]) + 1
@@ -369,10 +369,10 @@ class Program:
 
 
 def _counted(text: bytes, character: str, start: int = 0, stop: int | None = None) -> int:
-    """How often a character is there; `bytes.count` takes several times as long where there are many."""
+    """Number of occurrences of a character; several times faster than `bytes.count` if there are many."""
     return int(np.count_nonzero(np.frombuffer(text, dtype=np.uint8)[start:stop] == ord(character)))
 
 
 def view(array: NDArray[Any]) -> Sequence[Any]:
-    """An array as a sequence of plain Python numbers, made one at a time."""
+    """An array as a sequence that makes plain Python numbers on access."""
     return memoryview(np.ascontiguousarray(array))  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""From edits back to bytes: what no edit covers goes out as it came in."""
+"""Applies edits to a source text; bytes that no edit covers are written unchanged."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ncfix.values import frozen
 
 @frozen
 class Edit:
-    """Replace the source's bytes from `start` up to `stop` by `text`; with start == stop, insert it there."""
+    """Replacement of the source's bytes from `start` up to `stop` by `text`; with start == stop, an insertion."""
 
     start: int
     stop: int
@@ -22,9 +22,9 @@ class Edit:
 
 
 def apply(source: bytes, edits: Sequence[Edit]) -> bytes:
-    """The source with the edits made; they are sorted and do not overlap (insertions at one place keep their order).
+    """The source with the edits made; they must be sorted and disjoint (insertions at one place keep their order).
 
-    Raises ValueError if an edit reaches outside the source or into the one before it: a fault of the caller.
+    Raises ValueError if an edit reaches outside the source or into the one before it: an error of the caller.
     """
     pieces: list[bytes] = []
     done = 0
@@ -38,7 +38,7 @@ def apply(source: bytes, edits: Sequence[Edit]) -> bytes:
 
 
 def line_end(source: bytes) -> bytes:
-    """The line end that a text uses first; a carriage return alone only where there is no line feed."""
+    """The first line end of a text; a carriage return alone only if the text has no line feed."""
     at = source.find(b"\n")
     if at < 0 and b"\r" in source.rstrip(b"\r"):
         return b"\r"
@@ -47,11 +47,11 @@ def line_end(source: bytes) -> bytes:
 
 @frozen
 class Splices:
-    """Many edits as columns.
+    """Many edits, as columns.
 
-    start, stop  (n,) what is replaced
-    length       (n,) bytes of each replacement
-    data         the replacements, one after the other
+    start, stop  (n,) range that is replaced
+    length       (n,) number of bytes of each replacement
+    data         the bytes of all replacements in sequence
     """
 
     start: Ints
@@ -70,7 +70,7 @@ class Splices:
 
     @classmethod
     def joined(cls, parts: Sequence[Splices]) -> Splices:
-        """Several, sorted by place; at one place in the order given."""
+        """Several sets of edits as one, sorted by place; at the same place in the order given."""
         parts = [part for part in parts if len(part)] or [cls.of(())]
         if len(parts) == 1:
             start, stop, length, data = parts[0].start, parts[0].stop, parts[0].length, parts[0].data
@@ -88,11 +88,11 @@ class Splices:
         return cls(start[order], stop[order], length[order], b"".join(data[slice(*each)] for each in edges))
 
     def moved(self, way: int) -> Splices:
-        """These splices so many bytes further on."""
+        """These edits moved by `way` bytes."""
         return replace(self, start=self.start + way, stop=self.stop + way)
 
     def outside(self, spans: Ints) -> Splices:
-        """The splices that are not within spans (k, 2) of the source, which are apart from each other; in any order."""
+        """The edits that are not within any of the disjoint spans (k, 2) of the source, which may be in any order."""
         starts, stops = np.sort(spans, axis=0).T
         at = np.searchsorted(starts, self.start, side="right") - 1
         outside = (at < 0) | (self.start > stops[at])
@@ -100,7 +100,7 @@ class Splices:
         return Splices(self.start[outside], self.stop[outside], self.length[outside], data.tobytes())
 
     def edits(self) -> Iterator[Edit]:
-        """One by one."""
+        """The edits one by one."""
         at = 0
         for start, stop, length in zip(self.start.tolist(), self.stop.tolist(), self.length.tolist(), strict=True):
             yield Edit(start, stop, self.data[at : at + length])
@@ -108,7 +108,7 @@ class Splices:
 
 
 def spliced(source: bytes, splices: Splices) -> bytes:
-    """The source with many edits made, as `apply` does it; raises ValueError likewise."""
+    """The source with many edits made, like `apply`; raises ValueError likewise."""
     if not len(splices):
         return source
     start, stop = splices.start, splices.stop
@@ -126,7 +126,7 @@ def spliced(source: bytes, splices: Splices) -> bytes:
 
 
 def overlong(source: bytes, blocks: Ints, splices: Splices, limit: int) -> dict[int, int]:
-    """Blocks (n, 2) of which edits make a line of more than `limit` characters, and how many; 0 is no limit."""
+    """Blocks (n, 2) in which edits make a line longer than `limit` characters -> its length; limit 0: none."""
     if not limit or not len(splices):
         return {}
     grown = np.zeros(len(splices) + 1, dtype=np.int64)
@@ -149,7 +149,7 @@ def overlong(source: bytes, blocks: Ints, splices: Splices, limit: int) -> dict[
 
 
 def left_alone(source: bytes, splices: Splices, text: bytes) -> bool:
-    """Whether a text that was made by edits is the source, byte for byte, between them: only asked where compiled."""
+    """Whether `text`, made from the source by edits, is unchanged between them; compiled only."""
     from ncfix.core import edits
 
     columns = (np.ascontiguousarray(each) for each in (splices.start, splices.stop, splices.length))
