@@ -1,9 +1,9 @@
-"""One corrected motion put into its block: the words that change there, and the lines of the pieces that follow it.
+"""Writes one corrected motion into its block: the words that change, and the lines of further pieces after it.
 
-Everything here is in the numbers of the program: its units, its frame, degrees, diameters. A word is rewritten only
-when its value moves by half an output step; a missing word is added only when its axis must stand elsewhere by as
-much. What is returned as emitted is what the control will understand, digits and all. How numbers and words look is
-the control's `Spelling`; where they stand is the block's `Layout`.
+All numbers are those of the program: its units, its frame, degrees, diameters. A word is rewritten only if its value
+changes by half an output step; a missing word is added only if its axis must move by that much. The ends returned are
+what the control will read, rounded to the written digits. The style of numbers and words is the control's `Spelling`;
+their places are the block's `Layout`.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from ncfix.writer.block_text import BlockText
 from ncfix.writer.target import LINE, TANGENTIAL, Rendered, Target, feed_number, feed_way
 
 FEED_DECIMALS = 3
-"""F words of shares of a block in G93 keep the time of the block to this many decimals at least."""
+"""F words of the pieces of a block in G93 have at least this many decimals."""
 GRAIN = 1e-6
-"""A number that is so much of an output step above a whole number of them is that number."""
+"""Tolerance, in output steps, within which a number counts as a whole number of output steps."""
 
 STRAIGHT_AND_ARCS = (0, 10, 20, 30)
-"""Motion codes, in tenths, that may be stated anew: G0 to G3."""
+"""Motion codes, in tenths, that may be restated: G0 to G3."""
 
 CLOSED, EXACT = 1e-6, 1e-9
-"""Program units: an arc whose ends are nearer is a full circle, and positions that are nearer are the same."""
+"""Program units: an arc with ends nearer than `CLOSED` is a full circle; positions nearer than `EXACT` are equal."""
 NEAR = 2.0
-"""Steps of the control, in any unit: full circles end no farther from where they begin; other arcs end farther."""
+"""Distance of start and end, in steps of the control: full circles have less than this, other arcs more."""
 
 INVERSE_TIME, PER_MINUTE = "93", "94"
 
@@ -42,12 +42,12 @@ NO_TIME = "the block would become several, and in G93 no number behind its own F
 
 
 class BlockWriter(BlockText):
-    """Writes one motion into one block: `write()` is called once. A language adds what no other control has.
+    """Writes one motion into one block: `write()` is called once. A subclass adds what only its language has.
 
-    incremental  axis words that do not say how they are meant are increments
-    code     the motion code in force behind what is written so far, tenths
-    dragged  a turn of rotary axes alone whose time has to be stated, since it gets a linear motion
-    turning  columns of the rotary axes that words of the direction of the tool turn: they have no words of their own
+    incremental  axis words without a form of their own are increments
+    code     the motion code in force after what has been written, tenths
+    dragged  the motion turns only rotary axes and gets a linear motion, so its time must be stated
+    turning  columns of the rotary axes that are moved by words of the tool direction: they have no words of their own
     """
 
     def __init__(self, program: Program, block: int, layout: Layout, target: Target, spelling: Spelling) -> None:
@@ -111,12 +111,12 @@ class BlockWriter(BlockText):
             self._put_code(f"{wanted // 10}")
 
     def _put_code(self, number: str) -> None:
-        """Put a G code before the first axis word."""
+        """Insert a G code before the first axis word."""
         at = self.program.position(self.block, self.layout.code_at)
         self.out.edits.append((at, at, self._code(number) + self.layout.blank))
 
     def _code(self, number: str) -> str:
-        """How the language spells a G code."""
+        """A G code as the language writes it."""
         return self._cased("G") + number
 
     # -- axis words ---------------------------------------------------------------------------------------------------
@@ -128,7 +128,7 @@ class BlockWriter(BlockText):
         closed: Mask | None = None,
         skipped: Sequence[int] = (),
     ) -> None:
-        """Put the words of the axes right, and `position` where they lead; `closed` (n_axes,) stay where they are."""
+        """Correct the axis words, and move `position` to where they lead; `closed`: (n_axes,) axes that stay."""
         for column, letter in self.columns:
             if column in skipped:
                 continue
@@ -155,7 +155,7 @@ class BlockWriter(BlockText):
         self._arrive(position, column, start, end, word)
 
     def _meant(self, column: int, word: Word, *, increment: bool) -> float:
-        """What a word means as programmed where it is no plain number; NaN where that is not known."""
+        """The programmed value of a word that is not a plain number; NaN if it is not known."""
         target = self.target
         if target.incremental or not increment:
             return float(target.original[column] if increment == target.incremental else target.nominal[column])
@@ -163,17 +163,17 @@ class BlockWriter(BlockText):
         return float(target.nominal[column] - began)
 
     def _counted_from(self, position: Array, column: int) -> float:
-        """Where an increment counts from; in turned coordinates one axis that stands nowhere known hides them all."""
+        """The base of an increment; in a rotated frame, one axis of unknown position makes it unknown for all."""
         if not np.isfinite(position[column]):
             self.out.conflict = self.out.conflict or FROM_NOWHERE
         return float(position[column])
 
     def _reachable(self, column: int, end: float, piece: int = 0) -> float:
-        """Where an absolute word may lead an axis that is to go to the end of a piece."""
+        """The coordinate nearest to `end` that an absolute word can reach."""
         return end
 
     def _arrive(self, position: Array, column: int, start: float, end: float, word: Word) -> None:
-        """See that the word just written leads the axis to where it says."""
+        """Hook: ensure that the word just written moves the axis as intended."""
 
     def _absent_axis(self, position: Array, column: int, end: float) -> None:
         end = self._reachable(column, end)
@@ -184,23 +184,23 @@ class BlockWriter(BlockText):
         position[column] = base + self._add(self.target.letters[column], end - base, int(self.target.decimals[column]))
 
     def _step(self, position: Array, column: int, end: float) -> str:
-        """The number of a new axis word that leads to `end`, and `position` there."""
+        """The number of a new axis word that leads to `end`; sets `position`."""
         base = position[column] if self.incremental else 0.0
         text = self.spelling.number(end - base, int(self.target.decimals[column]))
         position[column] = base + value_of(text)
         return text
 
     def _may_add(self, column: int) -> bool:
-        """Whether an axis may get a word that has none."""
+        """Whether an axis without a word may get one."""
         allowed = self.layout.allowed is None or self.target.letters[column] in self.layout.allowed
         return allowed and column not in self.turning and not self.target.wordless[column]
 
     def _must_name(self, column: int) -> bool:
-        """Whether an axis gets a word even if it stands where that leads it."""
+        """Whether an axis gets a word even if the word does not move it."""
         return bool(self.target.spelled) and self.target.spelled[column]
 
     def _name_a_place(self, position: Array) -> None:
-        """A word for where an axis stands: the first line of what was an arc is a motion, even if it goes nowhere."""
+        """Add a word that keeps an axis at its place: the first line of a former arc must be a motion in any case."""
         for column, letter in self.columns:
             if self._may_add(column) and np.isfinite(position[column]):
                 base = position[column] if self.incremental else 0.0
@@ -208,9 +208,9 @@ class BlockWriter(BlockText):
                 return
 
     def _closed(self, position: Array, end: Array) -> Mask:
-        """The axes of the plane of a full circle: it has to end where it starts to the last digit.
+        """The axes of the plane of a full circle, which must end exactly where it starts.
 
-        An output step beside it, a control would make an arc of a thousandth of a degree of it.
+        One output step beside its start, a control would make an arc of a thousandth of a degree of it.
         """
         target, closed = self.target, np.zeros(len(position), dtype=bool)
         if not target.arc or len(target.ends) > 1:
@@ -221,7 +221,7 @@ class BlockWriter(BlockText):
         return closed
 
     def _stay(self, position: Array, column: int, word: Word | None) -> None:
-        """An axis that ends where it starts; a word that cannot say so to the last digit is left out."""
+        """Make an axis end where it starts; its word is removed if it cannot express that exactly."""
         if word is None:
             return
         start = float(position[column])
@@ -234,7 +234,7 @@ class BlockWriter(BlockText):
     # -- canned cycles ------------------------------------------------------------------------------------------------
 
     def _level(self) -> None:
-        """The level R of a canned cycle: its word, or one more where another level is in force."""
+        """Write the level R of a canned cycle: rewrite its word, or add one if another level is in force."""
         level = self.target.level
         if level is None:
             return
@@ -260,7 +260,7 @@ class BlockWriter(BlockText):
                 self._remove(word)
 
     def _kept_arc(self, start: Array, end: Array) -> None:
-        """Centre words of an arc that stays one; an R that no longer says which centre is meant gives way to I J K."""
+        """Write the centre of an arc that stays one; an R that no longer defines its centre is replaced by I J K."""
         target = self.target
         centre = target.centre.copy()
         word, whole = self.layout.radius, len(target.ends) == 1
@@ -278,7 +278,7 @@ class BlockWriter(BlockText):
         self.out.centre = centre
 
     def _has_centre(self) -> bool:
-        """Whether the arc has its centre in words, of which one that is left out is zero; beside an R none counts."""
+        """Whether the centre is given by words, where an omitted one is zero; with an R it is not."""
         return self.layout.radius is None
 
     def _centre_word(self, index: int, begin: float) -> float:
@@ -300,7 +300,7 @@ class BlockWriter(BlockText):
         return float(base + original)
 
     def _centre_by_radius(self, word: Word, start: Array, end: Array) -> Array | None:
-        """The centre that the radius as written means, if that is within an output step of where it belongs."""
+        """The centre defined by the radius as written; None if it is over an output step from the intended centre."""
         plane = list(self.target.plane[:2])
         radius = abs(self._value(word, np.nan))
         (x, y), (u, v), (a, b) = (
@@ -321,7 +321,7 @@ class BlockWriter(BlockText):
         return centre
 
     def _xyz(self, position: Array) -> Array:
-        """X Y Z of a position in the numbers in which centres are meant."""
+        """X Y Z of a position in the numbers used for centres: X is never a diameter."""
         values = np.array([position[column] if column >= 0 else 0.0 for column in self.target.spatial])
         if self.target.diameter:
             values[0] /= 2
@@ -330,14 +330,14 @@ class BlockWriter(BlockText):
     # -- the direction of the tool ------------------------------------------------------------------------------------
 
     def _says_direction(self) -> bool:
-        """Whether words of the block say which way the tool points; I J K do so in straight motions only."""
+        """Whether words of the block give the tool direction; I J K do so only in straight motions."""
         if self.spelling.vector[:1] != CENTRE_LETTERS[:1]:
             return bool(self.layout.vector or self.layout.angles)
         is_arc = np.isfinite(self.target.original_centre).any()
         return self.target.code in (0, LINE) and bool(self.layout.centre) and not is_arc
 
     def _point(self, position: Array, end: Array) -> None:
-        """Put the words of the direction right, and `position` where they take the rotary axes."""
+        """Correct the words of the tool direction, and turn the rotary axes of `position` to where they lead."""
         turning, target = list(self.turning), self.target
         if len(target.ends) == 1 and (np.abs(end - target.nominal)[turning] < self.half[turning]).all():
             position[turning] = target.nominal[turning]
@@ -359,30 +359,30 @@ class BlockWriter(BlockText):
 
     @cached_property
     def vector_length(self) -> float:
-        """The length of the direction as it is written."""
+        """The length of the direction vector as written."""
         values = (self._value(word, math.nan) for word in self.layout.centre.values())
         return (math.hypot(*filter(math.isfinite, values)) if self.spelling.vector_length else 0.0) or 1.0
 
     @property
     def vector_digits(self) -> int:
-        """Decimals that say the direction well enough."""
+        """Number of decimals needed for the components of the direction."""
         return max(self.spelling.vector_digits - math.floor(math.log10(self.vector_length)), 1)
 
     def _vector(self, end: Array) -> list[float]:
-        """The direction of the tool at an end, in the program's coordinates, as it is written."""
+        """The tool direction at an end, in program coordinates, scaled and rounded as it is written."""
         target = self.target
         assert target.pointing is not None
         direction = np.linalg.solve(target.rotation, target.pointing.direction(np.radians(end) + target.offset))
         return [round(float(part) * self.vector_length, self.vector_digits) for part in direction]
 
     def _direction_words(self, end: Array) -> list[str]:
-        """The words of direction of a further piece."""
+        """The direction words of a further piece."""
         return list(map(self._component, self.spelling.vector, self._vector(end)))
 
     def _turn(self, position: Array, end: Array) -> None:
-        """Put the rotary axes of `position` where the direction as written takes them.
+        """Turn the rotary axes of `position` to where the direction as written leads them.
 
-        The control takes the posture in which the program has them; an axis that may stand anywhere stays.
+        The control is taken to choose the posture nearest to the intended one; an axis whose angle is free stays.
         """
         target, turning = self.target, list(self.turning)
         assert target.pointing is not None
@@ -418,7 +418,7 @@ class BlockWriter(BlockText):
         return position
 
     def _opening(self, wanted: int) -> list[str]:
-        """What a further piece begins with: its motion code, where the piece before it had another one."""
+        """The motion code with which a further piece begins, if it differs from that of the piece before."""
         if self.target.arcs is None or wanted == self.code:
             return []
         self.code = wanted
@@ -439,7 +439,7 @@ class BlockWriter(BlockText):
         return words
 
     def _move_late_words(self) -> None:
-        """M0, M1, M2, M30 and their like act after the motion: with several pieces they go to the last."""
+        """Move M0, M1, M2, M30 and similar words to the last piece, since they act after the motion."""
         if not self.out.lines:
             return
         for word in self.layout.after:
@@ -454,13 +454,13 @@ class BlockWriter(BlockText):
         return self._inverse_time(self._value(self.layout.feed, np.nan) / float(self.target.shares[piece]))
 
     def _inverse_time(self, rate: float) -> float:
-        """The F of a piece in G93, if the control takes such a number."""
+        """The F of a piece in G93; sets a conflict if it is larger than the control accepts."""
         if 0 < (most := self.program.dialect.most_inverse_time) < rate:
             self.out.conflict = TOO_SHORT.format(most)
         return rate
 
     def _time_of_turn(self, begin: Array, end: Array) -> None:
-        """State the time of a turn of rotary axes alone in its own block; it is taken back behind it."""
+        """State the time of a rotation of rotary axes alone in its block; the feed in force is restored after it."""
         if not self.target.turn_by_feed:
             self._feed_mode(INVERSE_TIME)
         elif self.target.back_to_inverse_time:
@@ -479,7 +479,7 @@ class BlockWriter(BlockText):
             self.out.edits.append((*self.program.span(self.block, code.value_span), number))
 
     def _turn_feed(self, piece: int, begin: Array, end: Array) -> str:
-        """The number after F with which a piece of a turn takes its share of the time."""
+        """The F number that gives a piece of a rotation its share of the time."""
         minutes = self.target.turn_minutes * float(self.target.shares[piece])
         reach = feed_way(self.target.letters, begin, end, self.target.diameter) if self.target.turn_by_feed else 1.0
         return feed_number(self._inverse_time(reach / minutes)) if reach > 0 else self._feed_in_force()

@@ -1,4 +1,4 @@
-"""The text of one block while it is changed: its words read, put right in their own style, added and taken out."""
+"""Edits to the text of one block: reading words, rewriting them in their own style, adding and removing them."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ def columns_of(letters: tuple[str, ...]) -> tuple[tuple[int, str], ...]:
 
 @lru_cache(maxsize=32)
 def half_steps(decimals: tuple[int, ...]) -> Array:
-    """(n_axes,) half an output step of axes with so many digits behind the point; not to be written to."""
+    """(n_axes,) half an output step of axes with these numbers of decimals; read-only."""
     return np.asarray(0.5 * 10.0 ** -np.array(decimals, dtype=float))
 
 
 class BlockText:
-    """A block, and what its motion is to become; edits and lines are gathered in `out`, added words in `added`.
+    """A block whose motion is rewritten; edits and lines are collected in `out`, added words in `added`.
 
     columns  the axes in the order in which words are added
-    half     (n_axes,) half an output step of each
+    half     (n_axes,) half an output step of each axis
     """
 
     def __init__(self, program: Program, block: int, layout: Layout, target: Target, spelling: Spelling) -> None:
@@ -43,7 +43,7 @@ class BlockText:
         self.half = half_steps(tuple(target.decimals.tolist()))
 
     def _value(self, word: Word, otherwise: float) -> float:
-        """What a word says, if it is a plain number."""
+        """The value of a word that is a plain number; else `otherwise`."""
         if isinstance(word.value, Constant):
             return word.value.value
         if isinstance(word.value, Literal):
@@ -51,7 +51,7 @@ class BlockText:
         return otherwise
 
     def _increment(self, word: Word) -> float:
-        """What the word's number counts: other than 1 only for a length or angle without a decimal point."""
+        """The weight of the word's number: other than 1 only for a length or angle without a decimal point."""
         if not (isinstance(word.value, Literal) and word.value.pointless):
             return 1.0
         if word.address in self.target.letters:
@@ -59,8 +59,8 @@ class BlockText:
         return self.target.increments[0] if word.address in LENGTHS else 1.0
 
     def _rewrite(self, word: Word, value: float, decimals: int) -> float:
-        """Give a word another value in its own style; an expression gives way to a number, unless it is computed from
-        what was measured. Returns what is written."""
+        """Give a word another value in its own style; an expression is replaced by a number, unless it uses measured
+        values. Returns the value as written."""
         if self.target.measured and word.address in self.target.letters:
             column = self.target.letters.index(word.address)
             if self.target.measured[column]:
@@ -69,7 +69,7 @@ class BlockText:
         return self._replace(word, value / increment, decimals if increment == 1.0 else 0) * increment
 
     def _replace(self, word: Word, value: float, decimals: int, *, anew: bool = False) -> float:
-        """Another number in the place of that of a word, in its manner or `anew`; the number as written."""
+        """Replace the number of a word, in its style or in a new one (`anew`); returns the number as written."""
         start, stop = self.program.span(self.block, word.value_span)
         if anew or not isinstance(word.value, (Literal, Constant)):
             text = self.spelling.instead(value, decimals)
@@ -79,17 +79,17 @@ class BlockText:
         return value_of(text)
 
     def _restate(self, word: Word, number: str) -> None:
-        """Put another G code in the place of one."""
+        """Replace the number of a G code."""
         self._rewrite(word, float(number), 0)
 
     def _add(self, letter: str, value: float, decimals: int) -> float:
-        """Add a word; the number as written."""
+        """Add a word; returns the number as written."""
         text = self.spelling.number(value, decimals)
         self.added.append(self.layout.blank + self._cased(letter) + text)
         return value_of(text)
 
     def _remove(self, word: Word | None) -> None:
-        """Take a word out with the blanks before it, if nothing has been put between them."""
+        """Remove a word with the blanks before it, unless something has been inserted between them."""
         if word is not None:
             self._remove_span(word.span)
 
@@ -104,22 +104,22 @@ class BlockText:
         self.out.edits.append((start, stop, ""))
 
     def _take_back(self, span: Span) -> None:
-        """Forget the edits within a span; what is put before it stays."""
+        """Discard the edits within a span, except insertions before it."""
         first, last = self.program.span(self.block, span)
         self.out.edits = [edit for edit in self.out.edits if not first <= edit[0] < last or edit[1] == first]
 
     def _cased(self, address: str) -> str:
-        """A letter in the case in which the block writes its addresses; longer addresses are upper case."""
+        """A letter in the case of the block's addresses; longer addresses are in upper case."""
         at = self.program.position(self.block, self.layout.code_at)
         lower = len(address) == 1 and self.program.source[at : at + 1].islower()
         return address.lower() if lower else address
 
     @cached_property
     def prefix(self) -> str:
-        """What lines that are put in begin with."""
+        """The beginning of inserted lines."""
         text = self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
         return "" if "\n" in text else text
 
     def _line(self, words: Sequence[str]) -> None:
-        """Put a line behind the block."""
+        """Add a line after the block."""
         self.out.lines.append(self.prefix + self.layout.blank.join(words))

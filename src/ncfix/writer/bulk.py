@@ -1,9 +1,9 @@
-"""Stretches of corrected motions, straight ones and arcs, written all at once by the core.
+"""Writes stretches of corrected motions, straight ones and arcs, at once in the compiled core.
 
-What the emitter and `BlockWriter` do motion by motion, byte for byte; a test holds the two together.
-A motion qualifies if its block is words with plain numbers, is executed once, and becomes one block with the same
-motion code. Whatever is not clear to the last digit (a value in the middle between two outputs, a position that is
-not on the digits) ends a stretch, and the emitter takes it by itself.
+The result is identical, byte for byte, to that of the emitter and `BlockWriter`; a test compares them. A motion
+qualifies if its block consists of words with plain numbers, is executed once, and becomes one block with the same
+motion code. Whatever is not certain to the last digit (a value halfway between two outputs, a position that is not a
+whole number of output steps) ends a stretch, and is left to the emitter.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class Bulk:
     """The stretches of one emission.
 
     stop     (n + 1,) for each motion, the first one from there on that does not qualify
-    layouts  the layout of each shape that qualifies
-    added    lines that were put in
+    layouts  the layouts of the shapes that qualify
+    added    number of inserted lines
     """
 
     program: Program
@@ -63,7 +63,7 @@ class Bulk:
         frames: tuple[Frame, ...],
         jumps: Mask,
     ) -> Bulk:
-        """Find the stretches. `frame`, `frames` are those in which the control reads the motions."""
+        """Find the stretches. `frame`, `frames`: the frames in which the control reads the motions."""
         first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
         layouts = Layouts.of(language, program, moves)
         fit = qualified(program, moves, pieces, first_piece, layouts)
@@ -82,18 +82,18 @@ class Bulk:
 
     @cached_property
     def wordless(self) -> Mask | None:
-        """(n, n_axes) axes that must get no word: no stretch begins where one of them stands elsewhere. None: none."""
+        """(n, n_axes) axes that must get no word: no stretch begins where one of them is displaced. None: none."""
         wordless = self.moves.wordless
         return wordless if wordless.any() else None
 
     @property
     def text(self) -> Bytes:
-        """The source, with decimal points where it has commas."""
+        """The source, with decimal commas replaced by points."""
         comma, source = self.layouts.spelling.comma, self.program.source
         return np.frombuffer(source.translate(SWAPPED) if comma else source, dtype=np.uint8)
 
     def put(self, splices: Splices) -> None:
-        """Take in what changes, with commas if the program has such."""
+        """Record changes, with decimal commas if the program has them."""
         comma = self.layouts.spelling.comma
         self.parts.append(replace(splices, data=splices.data.translate(SWAPPED)) if comma else splices)
 
@@ -107,9 +107,9 @@ class Bulk:
         first_piece: Ints,
         plain: Mask,
     ) -> Bulk | None:
-        """The stretches of `plain` motions (n,), all of one frame; None if the frame does not allow any.
+        """The stretches of `plain` motions (n,), all in one frame; None if the frame does not allow any.
 
-        first_piece  (n + 1,) the first piece of each motion, and how many there are
+        first_piece  (n + 1,) the first piece of each motion, and the number of pieces
         """
         layouts = Layouts.of(language, program, moves)
         if not _is_plain(moves.frames[int(moves.frame[0])]):
@@ -126,10 +126,10 @@ class Bulk:
         return cls(program, moves, pieces, first_piece, layouts, _stops(fit))
 
     def take(self, row: int, position: Array, frame: FrameMap, decimals: Ints) -> Array | None:
-        """Write the stretch that begins with motion `row`, as far as it is clear, but for centres of arcs.
+        """Write the stretch that begins with motion `row` as far as it is certain, without the centres of arcs.
 
         position  (n_axes,) the command at which the control stands
-        decimals  (n_axes,) digits that the least increment needs
+        decimals  (n_axes,) number of decimals that the least increment needs
 
         Returns the commands at the ends of the pieces written, (k, n_axes); None if there are none.
         """
@@ -149,11 +149,11 @@ class Bulk:
         return ends
 
     def turn(self, rows: Ints, ends: tuple[Array, Array], frame: FrameMap, decimals: Ints) -> tuple[Mask, Array]:
-        """Write the centre words of arcs `rows` (k,) that were taken; of one that is not clear nothing stays written.
+        """Write the centre words of arcs `rows` (k,) of stretches; an arc that is not certain is taken out again.
 
-        ends  (k, n_axes) the commands at their starts and ends, as they were written
+        ends  (k, n_axes) the commands at their starts and ends, as written
 
-        Returns which are clear, (k,), and the centres of these, (c, 3), command coordinates, mm.
+        Returns which arcs are certain, (k,), and the centres of these, (c, 3), command coordinates, mm.
         """
         steps, centre = self._steps_for(decimals), self.pieces.centre[self.first_piece[rows]]
         words = CentreWords.of(self.program, self.layouts, self.moves, rows, ends, centre, frame, steps)
@@ -166,14 +166,14 @@ class Bulk:
         return clear, words.centre
 
     def alone(self, row: int, stop: int) -> list[int]:
-        """The arcs from motion `row` up to `stop` that `BlockWriter` writes."""
+        """The arcs from motion `row` up to `stop` that `BlockWriter` must write."""
         alone = self.layouts.alone
         if not alone.any():
             return []
         return (row + np.flatnonzero(alone[self.program.template[self.moves.block[row:stop]]])).tolist()
 
     def take_out(self, rows: list[int]) -> None:
-        """Nothing stays written of some motions of the stretch that was taken last."""
+        """Remove some motions from the stretch written last."""
         self.parts[-1] = self.parts[-1].outside(self.program.blocks[self.moves.block[rows]])
         self.added -= int(np.diff(self.first_piece)[rows].sum()) - len(rows)
 
@@ -181,7 +181,7 @@ class Bulk:
         return OutputSteps(self.text, decimals, 0.5 * 10.0 ** -decimals.astype(float), self.layouts.spelling.signed)
 
     def _written(self, row: int, position: Array, frame: FrameMap, steps: OutputSteps) -> tuple[Array, Splices] | None:
-        """The commands at the ends of the pieces of a stretch, (k, n_axes), and what changes in the words of axes."""
+        """The commands at the ends of a stretch's pieces, (k, n_axes), and the changes of its axis words."""
         words = core.loops("words")
         stop, program, layouts = int(self.stop[row]), self.program, self.layouts
         pieces = self.first_piece[row : stop + 1]
@@ -217,7 +217,7 @@ class Bulk:
         return commands[:done], Splices(start[:edits], end[:edits], length[:edits], data[:size].tobytes())
 
     def _room(self, pieces: Ints, blocks: NDArray[np.int32], words: int) -> int:
-        """Bytes that the words and lines of some motions take at most; `words`: those of a piece."""
+        """Upper bound of the bytes of words and lines of some motions; `words`: bytes of the words of a piece."""
         lines, line = int(pieces[-1] - pieces[0]), words + len(b"\r\n") + OPENING + CLOSING
         if not self.layouts.lined:
             return lines * line
@@ -228,28 +228,28 @@ class Bulk:
 
 
 def _stops(fit: Mask) -> Ints:
-    """(n + 1,) for each motion, and behind the last one, the first from there on that is not `fit` (n,)."""
+    """(n + 1,) for each motion, and after the last one, the first from there on that is not `fit` (n,)."""
     ends = np.append(np.flatnonzero(~fit), len(fit))
     return np.repeat(ends, np.diff(ends, prepend=-1))
 
 
 def _is_plain(frame: Frame) -> bool:
-    """Whether each number in a frame stands for one axis, with a point or without."""
+    """Whether in the frame each number stands for one axis, and a decimal point makes no difference."""
     turned = bool((frame.rotation != np.eye(3)).any())
     return not (turned or frame.diameter) and frame.increments == (1.0, 1.0)
 
 
-# -- arcs in a stretch that are written by themselves all the same -----------------------------------------------------
-# While a stretch is written they count as straight: their words of axes say where the motions behind them begin. Some
-# end elsewhere, by some digits; what behind one relies on that, having no word for an axis, is written by itself, too.
+# -- arcs within a stretch that are written by themselves --------------------------------------------------------------
+# While the stretch is written they count as straight: their axis words define where the next motions begin. Some end a
+# few digits elsewhere; then a following motion that has no word for such an axis is written by itself, too.
 
 
 def write_alone(arcs: Sequence[int], stop: int, start: Array, named: Mask, write: Callable[[int], Array]) -> list[int]:
-    """Write arcs of a stretch that ends before motion `stop`, in order, and what relies on where they end.
+    """Write arcs of a stretch that ends before motion `stop`, in order, and motions that depend on where they end.
 
-    start  (n, n_axes) the commands at which motions begin; put right
+    start  (n, n_axes) the commands at which motions begin; updated
     named  (n, n_axes) axes for which a motion has a word
-    write  writes a motion from its start on; returns the command at its end
+    write  writes a motion from its start; returns the command at its end
 
     Returns the motions that were written.
     """
@@ -270,7 +270,7 @@ def write_alone(arcs: Sequence[int], stop: int, start: Array, named: Mask, write
 
 
 def qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: Ints, layouts: Layouts) -> Mask:
-    """(n,) straight motions and arcs that may be written in bulk; `first_piece` (n + 1,) as in `Bulk`."""
+    """(n,) straight motions and arcs that can be written in bulk; `first_piece` (n + 1,) as in `Bulk`."""
     first = first_piece[:-1]
     fit: Mask = ((moves.kind == MotionKind.RAPID) & (moves.modal == 0)) | (
         (moves.kind == MotionKind.FEED) & (moves.modal == 10)
@@ -286,7 +286,7 @@ def qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: Ints,
 
 
 def sound(moves: Moves, pieces: Pieces, first_piece: Ints) -> Mask:
-    """(n,) motions that are corrected, from absolute words to where all is known."""
+    """(n,) motions that are corrected, have absolute words, and end at known positions."""
     first = first_piece[:-1]
     fit: Mask = (moves.rule == Rule.CORRECT) & ~moves.incremental & ~pieces.unchanged[first] & pieces.known[first]
     wordless = moves.wordless
@@ -296,10 +296,10 @@ def sound(moves: Moves, pieces: Pieces, first_piece: Ints) -> Mask:
 
 
 def with_dwells(fit: Mask, program: Program, moves: Moves, pieces: Pieces, first_piece: Ints, layouts: Layouts) -> Mask:
-    """Motions `fit` (n,), and dwells just behind them at which the axes shall stand where these leave them.
+    """Motions `fit` (n,), and dwells directly after them at which the axes stay where these motions leave them.
 
-    Nothing is written of such a dwell: its block is its own, and none of its numbers is the place of an axis (times and
-    motions that go with a dwell may have these letters).
+    Nothing is written for such a dwell. It must have a block of its own without axis words (times, and motions combined
+    with a dwell, may use these letters).
     """
     rows = np.flatnonzero(moves.kind[1:] == MotionKind.DWELL) + 1
     at, block = first_piece[rows], moves.block[rows]
@@ -313,7 +313,7 @@ def with_dwells(fit: Mask, program: Program, moves: Moves, pieces: Pieces, first
 
 
 def _writable_pieces(program: Program, moves: Moves, pieces: Pieces, first_piece: Ints, layouts: Layouts) -> Mask:
-    """(n,) motions in one straight piece; in several, if nothing but words goes with them."""
+    """(n,) motions with one straight piece, or with several straight ones that need only axis words."""
     single: Mask = (np.diff(first_piece) == 1) & ~pieces.arc[first_piece[:-1]]
     several = np.flatnonzero(~single)
     if len(several):

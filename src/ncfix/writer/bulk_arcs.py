@@ -1,7 +1,7 @@
-"""Arcs among motions written all at once: their centre words, as soon as those of their axes are known.
+"""Writes the centre words of arcs in stretches, once their axis words are known.
 
-What `BlockWriter` does arc by arc (`block.BlockWriter._kept_arc`), done as columns, byte for byte; a test holds the
-two together. An arc qualifies if it stays one, by G2 or G3, and has a plain R or plain I J K; a full circle does not.
+The result is identical, byte for byte, to that of `block.BlockWriter._kept_arc`; a test compares them. An arc qualifies
+if it stays one arc, by G2 or G3, and has a plain R or plain I J K; a full circle does not.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from ncfix.writer.pieces import Pieces
 from ncfix.writer.target import FrameMap
 
 PLANES = np.array(((1, 2), (2, 0), (0, 1)))
-"""The axes of a plane, X Y Z being 0 1 2, in the order in which their words are added; by the one across it."""
+"""The axes of a plane (indices of X Y Z), in the order in which their words are added, by the axis across it."""
 CIRCLE_MM = 1e-3
-"""Ends that are nearer to each other may be those of a full circle: that is for `BlockWriter` to say."""
+"""Smallest distance of start and end of an arc written in bulk, mm: below it `BlockWriter` decides on a full circle."""
 SEMICIRCLE = 1e-6
-"""Program units: a radius that is so near to half the chord says too little of where the centre is."""
+"""Smallest difference, program units, between radius and half chord: below it the radius does not define the centre."""
 TIE = 1e-4
-"""Half output steps: so near to the distance allowed between centres, the side that it is on is for `BlockWriter`."""
+"""Margin, in half output steps, around the allowed distance of centres within which `BlockWriter` decides."""
 
 
 def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: Ints, layouts: Layouts) -> Mask:
-    """(n,) arcs that become one arc, and whose words are such that it may be written in bulk.
+    """(n,) arcs that stay one arc and whose words can be written in bulk.
 
-    Those that `BlockWriter` writes by themselves may become more than that.
+    Arcs that `BlockWriter` writes may become more than one.
 
     first  (n,) the first piece of each motion
     """
@@ -53,7 +53,7 @@ def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: Ints, layo
 
 
 def _planes(moves: Moves, rows: Ints) -> Ints:
-    """(k, 2) the axes of the planes of arcs `rows`, X Y Z being 0 1 2, in a frame that is not turned."""
+    """(k, 2) the axes (indices of X Y Z) of the planes of arcs `rows`, in a frame that is not rotated."""
     planes: Ints = PLANES.take(np.abs(moves.normal[rows]).argmax(axis=1), axis=0)
     return planes
 
@@ -65,10 +65,10 @@ def _spatial(moves: Moves) -> Ints:
 
 @frozen
 class OutputSteps:
-    """How numbers are written: the text they stand in, digits that the least increment needs, half output steps.
+    """How numbers are written: the text that contains them, decimals for the least increment, half output steps.
 
     decimals, half  (n_axes,)
-    signed          with a sign
+    signed          whether numbers always have a sign
     """
 
     text: Bytes
@@ -79,17 +79,17 @@ class OutputSteps:
 
 @frozen
 class CentreWords:
-    """The centre words of arcs in order: k rows, a column for each of the two axes of an arc's plane.
+    """Changes to the centre words of k arcs in order; columns for the two axes of each arc's plane.
 
     block    (k,) the block of each arc
     plane    (k, 2) its axes
-    words    (k, 2) the number of each centre word, `NONE` where there is none
-    wanted   (k, 2) what they are to say, program numbers
-    rewrite  (k, 2) words that get another value; `styles`: how these are written, in this order
-    add      (k, 2) words that are missing
-    given_up (k,) R gives way to them
-    centre   (k, 3) command coordinates of the centre that is meant then, mm
-    clear    (k,) all that is clear to the last digit
+    words    (k, 2) index of each centre word's number, `NONE` if there is no word
+    wanted   (k, 2) intended values, program numbers
+    rewrite  (k, 2) words that get another value; `styles`: their number styles, in this order
+    add      (k, 2) words that are added
+    given_up (k,) R is replaced by centre words
+    centre   (k, 3) the resulting centre, command coordinates, mm
+    clear    (k,) everything is certain to the last digit
     """
 
     block: Ints
@@ -116,10 +116,10 @@ class CentreWords:
         frame: FrameMap,
         steps: OutputSteps,
     ) -> CentreWords:
-        """Work out which words of arcs `rows` change.
+        """Determine which words of arcs `rows` change.
 
-        ends    (k, n_axes) the commands at their starts and ends, as they are written
-        centre  (k, 3) where their centres shall be, command coordinates
+        ends    (k, n_axes) the commands at their starts and ends, as written
+        centre  (k, 3) their intended centres, command coordinates
         """
         block = moves.block.take(rows).astype(np.int64)
         shape, plane, each = program.template.take(block), _planes(moves, rows), np.arange(len(rows))[:, None]
@@ -162,13 +162,13 @@ class CentreWords:
         )
 
     def rows(self, chosen: Mask) -> CentreWords:
-        """Some of the arcs."""
+        """Those of the chosen arcs."""
         styles = self.styles.rows(np.flatnonzero(chosen[np.flatnonzero(self.rewrite) // 2]))
         columns = {each.name: getattr(self, each.name)[chosen] for each in fields(self) if each.name != "styles"}
         return CentreWords(styles=styles, **columns)
 
     def splices(self, program: Program, layouts: Layouts, steps: OutputSteps) -> Splices:
-        """What changes in the source."""
+        """The changes in the source."""
         shape = program.template.take(self.block)
         old, rows = np.flatnonzero(self.rewrite), np.flatnonzero(self.given_up)
         spans = program.number_spans.take(self.words.ravel().take(old), axis=0)
@@ -189,9 +189,9 @@ class CentreWords:
 
 
 def _nearest_centre(radius: Array, start: Array, end: Array, wanted: Array) -> tuple[Array, Array]:
-    """The centre (k, 2) that a radius means, of the two the one nearer to `wanted`, and how far off it is, (k,).
+    """The centre (k, 2) defined by a radius, of the two the one nearer to `wanted`, and its distance from it, (k,).
 
-    As `block.BlockWriter._centre_by_radius`. Infinitely far where there is no radius (NaN), or none that reaches.
+    As `block.BlockWriter._centre_by_radius`. Infinitely far if there is no radius (NaN), or if it is too short.
     """
     way = end - start
     half_chord = np.hypot(way[:, 0], way[:, 1]) / 2

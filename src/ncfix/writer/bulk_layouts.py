@@ -1,4 +1,4 @@
-"""Where things stand in the blocks of all shapes that are written in bulk: `BulkLayout` as columns."""
+"""The layouts of all block shapes that can be written in bulk: `BulkLayout` as columns."""
 
 from __future__ import annotations
 
@@ -16,37 +16,37 @@ from ncfix.values import frozen
 from ncfix.writer.language import WrittenLanguage
 
 OPENING, CLOSING = 4, 8
-"""Bytes that stand at most before and behind the axis words of a further piece."""
+"""Largest number of bytes before and after the axis words of a further piece."""
 NONE = -1
-"""The slot of an axis that has no word."""
+"""Slot of an axis that has no word."""
 VECTOR_HEAD = 1
-"""The letter of one that other words of the block lead to where it shall be."""
+"""In place of the letter: other words of the block move the axis."""
 
 
 @frozen
 class Layouts:
-    """The layouts of a program's shapes, one row for each template; columns by axis.
+    """The layouts of a program's shapes, one row per template; columns by axis.
 
-    known      (s,) blocks of the shape may be written in bulk
-    further    (s,) further pieces of their motions, too
-    slots      (s, n_axes) which of the block's numbers an axis has, or `NONE`
-    by_place   (s, n_axes) the axes as their words stand in the block, -1 behind the last one
+    known      (s,) blocks of the shape can be written in bulk
+    further    (s,) so can further pieces of their motions
+    slots      (s, n_axes) slot of each axis word's number in the block, or `NONE`
+    by_place   (s, n_axes) the axes in the order of their words in the block, -1 after the last one
     by_letter  (n_axes,) the axes in the order in which programs write them
     anchors    (s, 2) slot and offset of the place where missing words go
-    heads      (s, n_axes, 2) what stands before the number of a missing word: a blank, or 0 for nothing, and the
-               letter; 0 for it: such an axis gets no word; `VECTOR_HEAD`: it is led
+    heads      (s, n_axes, 2) bytes before the number of a missing word: a blank, or 0 for none, and the letter. Letter
+               0: the axis gets no word; `VECTOR_HEAD`: other words move it
     leads      (s, 2) slot and offset of the place up to which lines of further pieces repeat the beginning of the block
-    openings   (s, k) what stands on them before their words, 0 for nothing
-    closings   (s, k) what stands on them behind these
-    round      (s,) arcs of the shape may be written in bulk, too, as long as they stay one arc
-    centre     (s, 3) which of the block's numbers is I, J and K, or `NONE`
+    openings   (s, k) bytes before the words of such lines, 0 for none
+    closings   (s, k) bytes after these words
+    round      (s,) arcs of the shape can be written in bulk, as long as they stay one arc
+    centre     (s, 3) slots of I, J and K, or `NONE`
     fixed      (s, 3) which of these count from the origin
-    centre_heads  (s, 3, 2) what stands before the number of one that is missing, as `heads`
-    radius     (s,) which of them is R, or `NONE`
-    alone      (s,) `BlockWriter` writes them
-    taken      (s, 2, 2) slot and offset of where that word begins, with the blank before it, and of its end
+    centre_heads  (s, 3, 2) bytes before the number of a missing centre word, as `heads`
+    radius     (s,) slot of R, or `NONE`
+    alone      (s,) arcs of the shape are written by `BlockWriter`
+    taken      (s, 2, 2) slot and offset of the beginning of R, with the blank before it, and of its end
     spelling   how numbers are written
-    lined      lines of further pieces begin with more than axis words
+    lined      whether lines of further pieces begin with more than axis words
     """
 
     known: Mask
@@ -71,13 +71,13 @@ class Layouts:
 
     @property
     def arrays(self) -> tuple[Ints, Ints, Ints, Ints, Bytes, Ints, Bytes, Bytes]:
-        """What the compiled core goes by."""
+        """The columns that the compiled core needs."""
         text = self.openings, self.closings
         return self.slots, self.by_place, self.by_letter, self.anchors, self.heads, self.leads, *text
 
     @classmethod
     def of(cls, language: WrittenLanguage, program: Program, moves: Moves) -> Layouts:
-        """The layouts of the shapes that occur and can be written in bulk."""
+        """The layouts of all shapes in use that can be written in bulk."""
         n, axes = len(program.templates), moves.axes
         by_letter = np.array(sorted(range(len(axes)), key=lambda column: AXIS_LETTERS.index(axes[column])), np.int64)
         table = cls(
@@ -142,7 +142,7 @@ class Layouts:
 
 
 def places_of(program: Program, blocks: Ints, anchors: Ints) -> Ints:
-    """The bytes of `blocks` (k,) that anchors (s, 2), those of each shape, stand for."""
+    """The bytes of `blocks` (k,) at the anchors (s, 2) of their shapes."""
     slot, offset = anchors[program.template[blocks]].T
     edges = program.blocks[blocks, np.where(slot == START, 0, 1)]
     behind = slot >= 0

@@ -1,8 +1,8 @@
-"""Corrected motions back into the text of the program: which bytes change, and what the control will understand.
+"""Writes corrected motions into the program text: the bytes that change, and the path the control will read.
 
-The emitter walks the motions in the order of execution and keeps the book that the control keeps: where it stands
-(as emitted, digits and all) and which motion code is in force. A block that is executed several times must come out
-the same each time; where it does not, the block is reported as a conflict, and the caller keeps it as it was.
+The emitter follows the motions in order of execution and tracks the state of the control: its position (as written,
+rounded to digits) and the motion code in force. A block that is executed several times must be written the same each
+time; if not, the block is reported as a conflict, and the caller keeps it unchanged.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ MODE_LOST = "written as lines it would leave G1 in force, and a block behind it 
 
 @frozen
 class Emission:
-    """What was written.
+    """Result of writing.
 
     splices    replacements and insertions in the source, sorted
-    end        (m, n_axes) the command at the end of each piece as the control will understand it
-    centre     (m, 3) the centre of arc pieces likewise
-    start      (n, n_axes) the command at the start of each motion likewise
-    conflicts  block -> why it cannot be written; the text is not to be used while there are any
-    added_blocks  lines added
-    timed      motions that turn rotary axes alone and have got inverse time (G93), ascending
+    end        (m, n_axes) the command at the end of each piece as the control will read it
+    centre     (m, 3) the centre of each arc piece, likewise
+    start      (n, n_axes) the command at the start of each motion, likewise
+    conflicts  block -> why it cannot be written; the text must not be used if there are any
+    added_blocks  number of lines added
+    timed      motions that turn only rotary axes and were written in inverse time (G93), ascending
     """
 
     splices: Splices
@@ -72,11 +72,11 @@ def emit(
 ) -> Emission:
     """Write `pieces` into the program.
 
-    least_increment  (n_axes,) mm and rad: what the control can resolve
-    reading          what a control made of an earlier attempt, if it was not what was meant
-    done             (n_axes,) the command at the end of the first motion, if that is written already
-    kinematics       what the machine's own say where tool-centre-point control goes on or off; else an attempt shows it
-    bulk             the stretches of motions that all go on from each other, if known; then `done` is where they begin
+    least_increment  (n_axes,) mm and rad: resolution of the control
+    reading          how a control read an earlier attempt, if not as intended
+    done             (n_axes,) the command at the end of the first motion, if that is already written
+    kinematics       the machine's kinematics, for TCP being switched; without them an attempt shows the result
+    bulk             the stretches of contiguous motions, if known; then `done` is the command at which they begin
     """
     reading = reading or SecondReading(moves.frame, moves.frames)
     emitter = _Emitter(program, moves, pieces, least_increment, reading, kinematics, bulk)
@@ -84,19 +84,19 @@ def emit(
 
 
 class _Emitter:
-    """The walk over the motions; `run()` is called once.
+    """Follows and writes the motions; `run()` is called once.
 
-    forgets      (n,) motions after which the level R of a canned cycle counts no more
-    relies       (n,) motions that rely on the motion code in force, where they stay as they are
-    position     (n_axes,) the command at which the control stands, as emitted
-    jumps        (n, n_axes) where a motion does not start where the one before ended
-    replaced     the motion code in force, in tenths, where it is not the program's own; else None
-    replaced_by  the block that has put it there
-    cycle_end    (n_axes,) the bottom of the last hole while canned cycles follow each other; None otherwise
+    forgets      (n,) motions after which the level R of a canned cycle is no longer in force
+    relies       (n,) motions that, if unchanged, rely on the motion code in force
+    position     (n_axes,) the command at which the control stands, as written
+    jumps        (n, n_axes) where a motion does not start at the end of the one before
+    replaced     the motion code in force, in tenths, if it is not the program's own; else None
+    replaced_by  the block that changed it
+    cycle_end    (n_axes,) the bottom of the last hole in a series of canned cycles; None elsewhere
     levels       the level R of canned cycles
-    in_stretch   (n,) motions that were written in bulk
-    written      block -> what was written of each of the others
-    latest       the blocks among these whose edits have not been taken yet
+    in_stretch   (n,) motions written in bulk
+    written      block -> what was written of each other block
+    latest       blocks of `written` whose edits have not been collected yet
     end, centre, start, conflicts  as in `Emission`
     """
 
@@ -138,7 +138,7 @@ class _Emitter:
         self.end, self.centre, self.start = pieces.end.copy(), pieces.centre.copy(), moves.start.copy()
 
     def run(self, done: Array | None, row: int) -> Emission:
-        """Walk all motions from `row` on; the control stands at `done` (n_axes,) there, if that is given."""
+        """Write all motions from `row` on; `done` (n_axes,): the command at which the control stands, if given."""
         self.position = self.position if done is None else done.copy()
         while row < len(self.moves):
             count = self._stretch(row)
@@ -168,16 +168,16 @@ class _Emitter:
 
     @cached_property
     def moved(self) -> Mask:
-        """(n, n_axes) axes that a motion takes to its end; found out at the first unchanged motion."""
+        """(n, n_axes) axes that each motion moves to its end; computed at the first unchanged motion."""
         return self.moves.moved
 
     @cached_property
     def turns(self) -> Mask:
-        """(n,) motions that turn rotary axes alone."""
+        """(n,) motions that turn only rotary axes."""
         return turns_alone(self.moves)
 
     def _stretch(self, row: int) -> int:
-        """Write the stretch of motions that begins here all at once; the number of motions written."""
+        """Write the stretch of motions that begins here in bulk; returns the number of motions written."""
         if self.replaced is not None:
             return 0
         frame, before = self.reading.frame[row], len(self.bulk.parts)
@@ -201,13 +201,13 @@ class _Emitter:
         return stop - row
 
     def _written(self, row: int) -> Array:
-        """Write a motion by itself from its start on; the command at its end."""
+        """Write a single motion from its start; returns the command at its end."""
         self.position, self.replaced = self.start[row], None
         (self._leave if self.pieces.unchanged[self.first_piece[row]] else self._write)(row)
         return np.asarray(self.position)
 
     def _write_centres(self) -> None:
-        """Write the centres of the arcs in stretches; where these are not clear, the arc by itself."""
+        """Write the centres of the arcs in stretches; an arc whose centre is not certain is written by itself."""
         rows = self.pieces.move[np.flatnonzero(self.pieces.arc)]
         rows = rows[self.in_stretch[rows]]
         frames = self.reading.frame[rows]
@@ -223,7 +223,7 @@ class _Emitter:
     # -- the control's book -------------------------------------------------------------------------------------------
 
     def _resync(self, row: int) -> None:
-        """Where the control moved without a motion of ours (its own cycles, reference points), take its word."""
+        """Take over the control's own position where it moved by itself (in its cycles, to reference points)."""
         jump = self.jumps[row]
         if jump.any():
             began = self.reading.start
@@ -232,7 +232,7 @@ class _Emitter:
             self.position = np.where(jump, read, self.position) if still is None else still
 
     def _retract(self, row: int) -> None:
-        """After a canned cycle the control stands where it started, or at R; an attempt shows if it does not."""
+        """Set the position after a canned cycle: where it started, or at R; if neither, a second reading shows it."""
         if row + 1 == len(self.moves) or self.reading.start is not None:
             return
         moves, risen = self.moves, self.levels.returns(row)
@@ -263,7 +263,7 @@ class _Emitter:
         return np.asarray(np.where(self.increments[row], self.position + way, moves.end[row]))
 
     def _check_code(self, row: int) -> None:
-        """An unchanged motion must not rely on a code that was replaced."""
+        """Report a conflict if an unchanged motion relies on a motion code that was replaced."""
         layout = self._layout(int(self.moves.block[row]))
         lost = self.replaced not in (None, int(self.moves.modal[row])) and (layout is None or layout.motion is None)
         if lost and self.replaced_by not in self.conflicts:
@@ -370,13 +370,13 @@ class _Emitter:
         )
 
     def _turn_minutes(self, row: int) -> float:
-        """The time of a turn of rotary axes alone, where the control might give its feed to linear axes."""
+        """The time, min, of a rotation of rotary axes alone, if linear axes might take over its feed; else NaN."""
         if self.program.dialect.feed_of == "all" or not self.turns[row]:
             return float("nan")
         return minutes(self.moves, row)
 
     def _before(self, row: int) -> Array:
-        """Where axes stand that the block does not name; in a canned cycle the depth of the last hole counts."""
+        """The positions of axes that the block does not name; in a canned cycle, the depth of the last hole."""
         if self.cycle_end is not None and self.kind[row] == MotionKind.CYCLE:
             return self.cycle_end
         return self.position
@@ -390,7 +390,7 @@ class _Emitter:
     # -- the result ---------------------------------------------------------------------------------------------------
 
     def _edits(self) -> list[Edit]:
-        """What was written one by one since this was last asked."""
+        """The edits of blocks written one by one since the last call."""
         edits, end_of_line = list[Edit](), self.program.line_end.decode()
         for block in sorted(self.latest):
             rendered = self.written[block]

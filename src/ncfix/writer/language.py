@@ -1,4 +1,4 @@
-"""A family of controls, as the functions in which they differ: how corrected motions are written."""
+"""A language with its writer: the functions that put corrected motions into the words of a family of controls."""
 
 from __future__ import annotations
 
@@ -21,20 +21,21 @@ class Writer(Protocol):
     """Writes one motion into one block."""
 
     def write(self) -> Rendered:
-        """What is written; called once."""
+        """Write the motion; called once."""
 
 
 @frozen(kw_only=True)
 class WrittenLanguage(FollowedLanguage):
-    """One family of controls: how its programs are read, followed, and written. That is what a dialect names.
+    """How programs of one family of controls are read, followed and written; a dialect names such an object.
 
-    writer    (program, block, layout, target, spelling) -> what writes the motion of a block: `BlockWriter`, or a
-              class of its kind with what no other control has
-    arc_pieces  `writer` can write an arc as several (`Target.arcs`)
-    one_by_one  (program, moves, pieces, first piece of each motion) -> (n,) motions that `writer` has to write one by
-              one for what else there is about them; None: none
-    held_angle  (text of the program, rotary axis, angle as programmed, corrected, one digit) -> the angle that the
-              control may be told, degrees; None: any
+    writer    (program, block, layout, target, spelling) -> the writer of a block's motion: `BlockWriter`, or a subclass
+              with what only this language has
+    arc_pieces  whether `writer` can write an arc as several arcs (`Target.arcs`)
+    one_by_one  (program, moves, pieces, first piece of each motion) -> (n,) motions that cannot be written in bulk for
+              reasons of the language; None: none
+    held_angle  (program text, rotary axis, angle as programmed, corrected, one digit) -> the angle, degrees, that may
+                be
+              commanded instead of the corrected one; None: any angle
     """
 
     writer: Callable[[Program, int, Any, Target, Spelling], Writer]

@@ -1,10 +1,11 @@
-"""Corrected motions as columns: what shall be commanded instead, one row per block piece to be written; and what a
-control made of an earlier attempt to write them, which the next one has to know.
+"""Corrected motions as columns: new commands, one row per piece of a block; and how a control read an earlier attempt
+to write them.
 
-Which motions have to be left as they were because one that follows is: an arc that keeps its words needs its start.
-A refused line, increment or hole that starts a little elsewhere is the same path a little elsewhere, no farther from
-what is meant than an uncorrected one. So is an arc whose end and centre both count from its start. But an arc with
-an end or centre of its own no longer closes, so what is before it must end where it did, along the axes of its plane.
+It also decides which motions must stay unchanged because a refused arc follows, which keeps its words and so needs its
+original start. A refused line, increment or hole that starts slightly elsewhere is the same path slightly displaced, no
+farther from the intended one than without correction; so is an arc whose end and centre both count from its start. But
+an arc with an absolute end or centre would no longer close, so the motion before it must end at its original place,
+along the axes of the arc's plane.
 """
 
 from __future__ import annotations
@@ -22,19 +23,20 @@ from ncfix.values import frozen
 
 @frozen
 class Pieces:
-    """The corrected path, struct of arrays; m rows in order, at least one per motion.
+    """The corrected path as a struct of arrays; m rows in order, at least one per motion.
 
-    A motion that need not be split has one row; a motion that stays unchanged has one row with its original end.
+    A motion that is not split has one row; an unchanged motion has one row with its original end.
 
     move       (m,) index of the motion in `Moves`
-    fraction   (m,) where on the original motion the piece ends, in (0, 1]; the last piece of a motion has 1
+    fraction   (m,) position of the piece's end on the original motion, in (0, 1]; 1 for the last piece of a motion
     end        (m, n_axes) the command at the end of the piece, mm and rad, before rounding to the control's digits
-    arc        (m,) the piece is an arc (its motion is an arc and stays one), else straight
+    arc        (m,) whether the piece is an arc (part of an arc that stays one), else straight
     centre     (m, 3) centre of an arc piece in command coordinates, mm, NaN elsewhere
-    unchanged  (m,) the motion is left as it was
-    share      (m,) the piece's share of its motion's time, for inverse-time feed; None: that of the fraction. They
-               differ for pieces that only take up a jump (play, a step): these have next to no fraction, but a way
-    approach   (m, n_axes) of canned cycles: the command at the level R, as `Moves.approach`; None: nowhere
+    unchanged  (m,) the motion is not changed
+    share      (m,) the piece's share of its motion's time, for inverse-time feed; None: in proportion to the fraction.
+               It differs for pieces that take up a jump (play, a step): their fraction is almost zero, but not their
+               length
+    approach   (m, n_axes) of canned cycles: the command at level R, as `Moves.approach`; None: nowhere
     """
 
     move: Ints
@@ -61,31 +63,31 @@ class Pieces:
 
     @property
     def last(self) -> Index:
-        """(n,) the last one."""
+        """(n,) the last piece of each motion."""
         return np.flatnonzero(np.diff(self.move, append=self.move[-1:] + 1))
 
     @property
     def begun(self) -> Array:
-        """(m,) where on its motion each piece begins, as `fraction` says where it ends."""
+        """(m,) position of each piece's beginning on its motion, as `fraction` for its end."""
         begun = np.append(0.0, self.fraction)[:-1]
         begun[self.first] = 0.0
         return begun
 
     @property
     def known(self) -> Mask:
-        """(m,) the command at the end is known in all axes."""
+        """(m,) whether the command at the end is known in all axes."""
         finite = np.isfinite(self.end)
         return np.ones(len(self), dtype=np.bool_) if finite.all() else np.asarray(finite.all(axis=1))
 
 
 @frozen
 class SecondReading:
-    """What a control made of an earlier attempt, one row per motion of the original.
+    """How a control read an earlier attempt; one row per motion of the original.
 
-    A program may set its frames where the machine stands (G92, G10 L20): then they move with the corrections.
+    A program may set its frames from the machine's position (G92, G10 L20): then they move with the corrections.
 
-    frame, frames  (n,) index into `frames`: the frame in which each motion is really read
-    start, end     (n, n_axes) where unchanged motions really start and end; None before any attempt
+    frame, frames  (n,) index into `frames`: the frame in which each motion is actually read
+    start, end     (n, n_axes) actual start and end of unchanged motions; None before any attempt
     """
 
     frame: NDArray[np.int32]
@@ -95,7 +97,7 @@ class SecondReading:
 
     @classmethod
     def of(cls, moves: Moves, pieces: Pieces) -> SecondReading:
-        """From the motions that were read where `pieces` were written (same rows)."""
+        """From the motions read from the text to which `pieces` were written (same rows)."""
         last = pieces.last
         return cls(moves.frame[last], moves.frames, moves.start[pieces.first], moves.end[last])
 
@@ -103,16 +105,16 @@ class SecondReading:
 PINNED = "a refused arc that follows starts from its end"
 BEYOND_TRAVEL = "a refused increment that follows would leave the travel"
 STILL = 1e-9
-"""A component of a unit normal so near to 1 is 1."""
+"""Distance from 1 within which a component of a unit normal counts as 1."""
 
 
 @frozen
 class Refusals:
-    """Motions that have to be left as they were.
+    """Motions that must stay unchanged.
 
     unchanged  (n,) all of them
-    added      those that others need: row -> the row that needs it
-    reaches_back  something before the first motion would have to stay, too
+    added      those required by others: row -> the row that requires it
+    reaches_back  whether a motion before the first one would have to stay, too
     """
 
     unchanged: Mask
@@ -121,9 +123,9 @@ class Refusals:
 
 
 def closure_of_refusals(moves: Moves, unchanged: Mask, bound: Mask | None = None) -> Refusals:
-    """Extend `unchanged` (n,) so that refused arcs begin where they began.
+    """Extend `unchanged` (n,) so that refused arcs begin at their original start.
 
-    bound  (n,) other motions that must begin where they began, along the axes that they name
+    bound  (n,) other motions that must begin at their original start, along the axes that they name
     """
     walk = _Walk(moves, unchanged.copy(), np.zeros(len(moves), dtype=bool) if bound is None else bound)
     for row in np.flatnonzero(unchanged & walk.anchored)[::-1].tolist():
@@ -132,7 +134,7 @@ def closure_of_refusals(moves: Moves, unchanged: Mask, bound: Mask | None = None
 
 
 class _Walk:
-    """Goes back from refused arcs to motions that name all axes in question."""
+    """Steps back from refused arcs to motions that position all axes concerned."""
 
     def __init__(self, moves: Moves, unchanged: Mask, bound: Mask) -> None:
         self.moves = moves
@@ -149,7 +151,7 @@ class _Walk:
         self.anchored[arcs] |= ~self._floating(arcs) & ~self.passed[arcs]
 
     def _floating(self, arcs: Index) -> Mask:
-        """Which arcs (k,) have both end and centre that count from where they start, full circles among them."""
+        """Which arcs (k,) have both end and centre relative to their start; full circles are among them."""
         moves = self.moves
         named = [self.absolute[arcs, column] for column in self.columns if column >= 0]
         in_plane = np.abs(moves.normal[arcs]) < 1 - STILL
@@ -157,9 +159,9 @@ class _Walk:
         return np.asarray(~moves.about_fixed_point[arcs] & ~own.any(axis=1))
 
     def back_from(self, arc: int) -> None:
-        """Keep the motions before an arc until every axis of its plane has been named by one.
+        """Keep the motions before an arc until each axis of its plane has been positioned by one of them.
 
-        The cause that is noted for a motion is the next arc behind it.
+        The cause recorded for a motion is the next such arc after it.
         """
         if arc >= self.reached:
             return
@@ -179,7 +181,7 @@ class _Walk:
         self.reaches_back |= bool(needed.any())
 
     def _plane(self, row: int) -> Mask:
-        """The axes of an arc's plane; of other motions those that they name."""
+        """The axes of an arc's plane; for other motions, the axes that they name."""
         if self.bound[row]:
             return np.asarray(self.moves.programmed[row].copy())
         axes = np.zeros(len(self.moves.axes), dtype=bool)
@@ -189,7 +191,7 @@ class _Walk:
         return axes
 
     def _decided(self, row: int) -> Mask:
-        """The axes that stand behind a motion where it says, wherever it began."""
+        """The axes whose position after a motion does not depend on where it began."""
         moves = self.moves
         if self.passed[row]:
             return np.asarray(moves.moved[row])
