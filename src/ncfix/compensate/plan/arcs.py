@@ -1,8 +1,8 @@
-"""Arcs that stay arcs: where the corrected ends allow it, the circle that follows the corrected path best.
+"""Arcs that stay arcs: the circle through the corrected ends that follows the corrected path best.
 
-The centre lies on the perpendicular bisector of the corrected ends, so that the radii at both ends agree to rounding
-whatever the ends are. Where along the bisector is found by least squares over the corrected path, starting from the
-centre moved by the mean correction.
+The centre lies on the perpendicular bisector of the corrected ends, so that the radii at both ends always agree. Its
+place on the bisector is found by least squares over the corrected path, starting from the programmed centre plus the
+mean correction.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from ncfix.compensate.plan.segments import ArcColumns, Segments, sweep_between
 from ncfix.values import frozen
 
 LOOKS = np.arange(1, 13) / 13
-"""Fractions of each arc at which the corrected path is looked at to find the centre."""
+"""Fractions of each arc at which the corrected path is sampled to find the centre."""
 BATCH = 1024
-"""Arcs worked on at a time: what is known of them at so many places stays in the processor's cache."""
+"""Number of arcs worked on at a time, so that their samples stay in the processor's cache."""
 NUDGE = 1e-3
-"""mm by which the centre is moved to see what that does."""
+"""Step of the centre, mm, for the derivative of the points by its place."""
 CLOSED = 1e-6
-"""mm; ends closer to each other than this are one point."""
+"""Distance, mm, below which both ends of an arc are one point."""
 TURNED = 1e-9
-"""Of a turn; nearer to whole turns an arc has whole ones."""
+"""Fraction of a turn up to which a sweep beyond whole turns is none."""
 APART = 4.0
-"""So many rounding errors must lie between the ends of an arc that is not a full circle: rounded onto each other they
-would make it one."""
+"""Least distance between the ends of an arc that is not a full circle, as a multiple of the rounding: ends that are
+rounded onto each other would make it one."""
 
 
 Pair = tuple[Array, Array]
@@ -36,14 +36,14 @@ Pair = tuple[Array, Array]
 
 @frozen
 class Closure:
-    """What difference between an arc's radii at start and end a control accepts: any below `mm`, any below `relative`
-    times the radius."""
+    """The difference of start and end radius that a control accepts for an arc: up to `mm`, or `relative` times the
+    radius, whichever is larger."""
 
     mm: float = 0.0283
     relative: float = 0.001
 
     def allowance(self, radius: float) -> float:
-        """The accepted difference for that radius, mm."""
+        """The accepted difference for a radius, mm."""
         return max(self.mm, self.relative * radius)
 
 
@@ -53,7 +53,7 @@ class Fitted:
 
     centre  (k, 3) mm
     sweep   (k,) rad
-    sound   (k,) a control will accept it and understand the same arc
+    sound   (k,) whether the control will accept the arc and understand it as meant
     """
 
     centre: Array
@@ -62,10 +62,11 @@ class Fitted:
 
 
 def fitted(intent: Intent, standing: Segments, rows: Index, closure: Closure, rounding: float) -> Fitted:
-    """Arcs `rows` (k,) between the ends at which they really start and end (`standing`, all motions).
+    """Fit arcs `rows` (k,) to the corrected path between their corrected ends.
 
-    closure   what the control accepts; half of it is used
-    rounding  how far a point may move when it is rounded to the control's digits, mm
+    standing  all motions, with the starts and ends at which they really start and end
+    closure   the difference of radii that the control accepts; half of it is used
+    rounding  largest shift of a point by rounding to the control's digits, mm
     """
     return stacked([_fitted(intent, standing, rows[part], closure, rounding) for part in slices(len(rows), BATCH)])
 
@@ -89,7 +90,7 @@ def _fitted(intent: Intent, standing: Segments, rows: Index, closure: Closure, r
 
 
 def full_circles(intent: Intent, rows: Index) -> Mask:
-    """Arcs that end where they started in their plane, after whole turns, (k,)."""
+    """(k,) whether arcs `rows` are full circles: they end in their plane where they started, after whole turns."""
     moves = intent.moves
     turns = moves.sweep[rows] / (2 * np.pi)
     whole = (np.abs(turns) > 0.5) & (np.abs(turns - np.round(turns)) < 1e-6)
@@ -98,9 +99,9 @@ def full_circles(intent: Intent, rows: Index) -> Mask:
 
 
 def _corrected_path(intent: Intent, real: Segments, rows: Index) -> tuple[Array, Array]:
-    """X Y Z of the program at `LOOKS` of each arc, and what the corrected path wants there, (3, looks, k) both.
+    """(3, looks, k) X Y Z as programmed at `LOOKS` of each arc, and as wanted by the correction, mm.
 
-    Of axes that get no word it wants what they can do: their way as programmed, from where they stand.
+    An axis that gets no word is wanted where it goes anyway: its programmed way, from where it stands.
     """
     each, at = np.tile(rows, len(LOOKS)), np.repeat(LOOKS, len(rows))
     commands, chords = (
@@ -116,12 +117,12 @@ def _corrected_path(intent: Intent, real: Segments, rows: Index) -> tuple[Array,
 
 
 def across(vectors: Array, normal: Array) -> Array:
-    """The part of vectors (k, 3) across the normals."""
+    """(k, 3) the components of vectors (k, 3) across the normals (k, 3)."""
     return vectors - np.einsum("ij,ij->i", vectors, normal)[:, None] * normal
 
 
 def _onto_bisector(start: Array, end: Array, normal: Array, centre: Array) -> Array:
-    """Centres moved within the plane to be equally far from both ends."""
+    """(k, 3) centres moved within their plane onto the perpendicular bisector of both ends."""
     chord = across(end - start, normal)
     length = np.linalg.norm(chord, axis=1, keepdims=True)
     along = chord / np.where(length > 0, length, 1.0)
@@ -130,7 +131,7 @@ def _onto_bisector(start: Array, end: Array, normal: Array, centre: Array) -> Ar
 
 
 def _best_on_bisector(arcs: Segments, ends: Pair, centre: Array, wanted: Array) -> Array:
-    """Centres moved along the bisector so that the arcs come closest to the wanted points, by least squares."""
+    """(k, 3) centres moved along the bisector so that the arcs are closest to the wanted points, by least squares."""
     chord = across(ends[1] - ends[0], arcs.normal)
     way = vector_product(arcs.normal, chord)
     way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
@@ -144,12 +145,12 @@ def _best_on_bisector(arcs: Segments, ends: Pair, centre: Array, wanted: Array) 
 
 
 def _farthest(off: Array) -> Array:
-    """The longest of vectors (3, looks, k) of each arc, (k,)."""
+    """(k,) length of the longest of the vectors (3, looks, k) of each arc."""
     return np.sqrt((off * off).sum(axis=0).max(axis=0))
 
 
 def _points(arcs: Segments, ends: Pair, centre: Array) -> Array:
-    """X Y Z at `LOOKS` of arcs about other centres, (3, looks, k)."""
+    """(3, looks, k) X Y Z at `LOOKS` of the arcs with other ends and centres, mm."""
     sweep = sweep_between(*ends, centre, arcs.normal, arcs.sweep)
     return ArcColumns.of(replace(arcs, centre=centre, sweep=sweep), np.arange(len(centre))).at(LOOKS[:, None])
 
@@ -157,7 +158,7 @@ def _points(arcs: Segments, ends: Pair, centre: Array) -> Array:
 def _sound(
     arcs: Segments, ends: Pair, centre: Array, sweep: Array, closed: Mask, closure: Closure, rounding: float
 ) -> Mask:
-    """Whether radii agree to half of what the control accepts, after rounding, and the arc cannot be mistaken."""
+    """(k,) whether radii agree to half of what the control accepts, after rounding, and the arc cannot be misread."""
     radii = [np.linalg.norm(across(point - centre, arcs.normal), axis=1) for point in ends]
     allowed = np.maximum(closure.mm, closure.relative * np.minimum(*radii)) / 2
     agree = np.abs(radii[0] - radii[1]) + 4 * rounding <= allowed
@@ -169,5 +170,5 @@ def _sound(
 
 
 def turns_begun(sweep: Array) -> Array:
-    """How many turns, full ones and the last, a control is told of: a little more than one is next to nothing to it."""
+    """Number of turns of a sweep, counting the last, incomplete one; a remainder below `TURNED` is not counted."""
     return np.ceil(np.abs(sweep) / (2 * np.pi) - TURNED)

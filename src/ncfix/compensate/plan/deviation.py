@@ -1,8 +1,8 @@
-"""How far a real machine leaves the intended path: looked at for the plan, and as figures before and after.
+"""The deviation of a real machine from the intended path: for the plan, and as figures before and after a correction.
 
-Actual and intended tip are compared at the same fraction of a motion (see `intent`): for the plan as closely as is
-needed to tell whether motions stay within the tolerance; for figures where cycles and rapids end, and along all other
-motions as densely as the error model may bend, and at its kinks.
+Actual and intended tip are compared at the same fraction of a motion (see `intent`). For the plan, motions are sampled
+as densely as is needed to tell whether they stay within the tolerance. For figures, cycles and rapids are sampled at
+their ends; all other motions as densely as the error model may bend, and at its kinks.
 """
 
 from __future__ import annotations
@@ -40,25 +40,25 @@ from ncfix.machine.aim import CLOSE
 from ncfix.machine.error_model import DeviationBounds
 
 SURE = 0.5
-"""A motion whose deviation at a first look is under this share of the tolerance is within it."""
+"""Share of the tolerance below which a motion counts as within it after the first, coarse sampling."""
 FIRST = 2
-"""Samples for each time that the error may bend, at a first look."""
+"""Number of samples for each time that the error may bend, in the first sampling."""
 LEAST = 9
-"""Fewest samples at a second look."""
+"""Least number of samples in the second, dense sampling."""
 CORNER = 3**0.5
-"""How far the linear axes together may take the tip, per mm of their norm: three that are no more than parallel."""
+"""Largest motion of the tip by the linear axes, per mm of their norm: that of three parallel axes."""
 PLANNED_BATCH = 100_000
-"""Samples worked on at a time."""
+"""Number of samples worked on at a time."""
 
 
 def deviations(intent: Intent, real: Segments, rows: Index, check_start: Mask, tolerance: float) -> Array:
-    """The largest deviation of the tip along motions `rows` (k,) done as `real` has them, mm.
+    """(k,) the largest deviation of the tip along motions `rows` (k,) with the corrected ends of `real`, mm.
 
-    check_start  (n,) motions that may not begin where they should: they are looked at there too
+    check_start  (n,) motions that may not begin where they should: they are sampled there too
 
-    Motions that by a bound are off by less than half of the tolerance need no look. Short ones of the others get one
-    sample in the middle. Those off by more there are looked at as closely as the error model may bend; infinite where
-    they are too long for that.
+    A motion with a bound below half of the tolerance is not sampled. The others are sampled coarsely, short ones once
+    in the middle, and if they are off by more than half of the tolerance there, as densely as the error model may bend.
+    Infinite for motions that are too long for that.
     """
     worst = bounds(intent, real, rows, check_start)
     unknown = np.flatnonzero(~(worst <= SURE * tolerance))
@@ -67,14 +67,14 @@ def deviations(intent: Intent, real: Segments, rows: Index, check_start: Mask, t
 
 
 def looked_at(intent: Intent, real: Segments, rows: Index, check_start: Mask, tolerance: float) -> Array:
-    """As `deviations`, of motions that no bound speaks for."""
+    """Like `deviations`, by samples alone, without bounds."""
     worst, often = np.full(len(rows), np.inf), bends_closely(intent, rows)
     samples = DENSITY * often + LEAST
     seen = np.flatnonzero(samples < MOST)
     for part in batches(np.ceil(samples[seen]).astype(np.intp), MOST):
-        now = seen[part]
-        worst[now] = deviations_seen(intent, real, rows[now], check_start, FIRST, 1, often[now])
-        doubtful = now[~(worst[now] <= SURE * tolerance)]
+        batch = seen[part]
+        worst[batch] = deviations_seen(intent, real, rows[batch], check_start, FIRST, 1, often[batch])
+        doubtful = batch[~(worst[batch] <= SURE * tolerance)]
         if doubtful.size:
             closer = deviations_seen(intent, real, rows[doubtful], check_start, DENSITY, LEAST, often[doubtful])
             worst[doubtful] = np.maximum(worst[doubtful], closer)
@@ -82,9 +82,9 @@ def looked_at(intent: Intent, real: Segments, rows: Index, check_start: Mask, to
 
 
 def bounds(intent: Intent, real: Segments, rows: Index, check_start: Mask) -> Array:
-    """What the deviation along motions `rows` (k,) does not exceed, mm; inf where that is not known.
+    """(k,) upper bound of the deviation along motions `rows` (k,), mm; inf if no bound is known.
 
-    Known it is for straight motions from one corrected end to the next.
+    A bound is known for straight motions from one corrected end to the next.
     """
     most, moves = np.full(len(rows), np.inf), intent.moves
     plain = ~((moves.kind == MotionKind.ARC)[rows] | check_start[rows])
@@ -101,10 +101,10 @@ def bounds(intent: Intent, real: Segments, rows: Index, check_start: Mask) -> Ar
 
 
 def _bounds_of_axes(intent: Intent, real: Segments, rows: Index, bow: DeviationBounds) -> Array:
-    """As `bounds`, of motions in axis positions.
+    """`bounds` of motions without tool-centre-point control.
 
-    The tip's error leaves its chord by its bow; what is added to the linear axes goes straight from end to end, but
-    turns with the workpiece meanwhile.
+    The tip error leaves its chord by its bow. The correction of the linear axes is linear from end to end, but turns
+    with the workpiece during the motion.
     """
     start, end, linear = picked(real.start, rows), picked(real.end, rows), ~intent.machine.rotary
     meant = picked(intent.moves.start, rows), picked(intent.moves.end, rows)
@@ -115,7 +115,7 @@ def _bounds_of_axes(intent: Intent, real: Segments, rows: Index, bow: DeviationB
 
 
 def _bounds_of_tip(intent: Intent, real: Segments, rows: Index, bow: DeviationBounds) -> Array:
-    """As `bounds`, of motions under tool-centre-point control."""
+    """`bounds` of motions under tool-centre-point control."""
     machine, longest = intent.machine, float(np.abs(intent.lengths(rows)).max())
     commands = picked(real.start, rows), picked(real.end, rows)
     start, end = intent.joints_of(rows, *commands)
@@ -129,11 +129,11 @@ def _bounds_of_tip(intent: Intent, real: Segments, rows: Index, bow: DeviationBo
 def tcp_bounds(
     intent: Intent, bow: DeviationBounds, start: Array, end: Array, acceleration: Array, tool_length: float
 ) -> Array:
-    """As `bounds`, of motions under tool-centre-point control between corrected axis positions (k, n_axes).
+    """`bounds` of motions under tool-centre-point control between corrected axis positions (k, n_axes).
 
-    acceleration  (k,) of linear axes, as `accelerations` has it
+    acceleration  (k,) bound of the acceleration of linear axes, see `accelerations`
 
-    What is added to X Y Z goes straight in the workpiece, so that only the tip's error can leave its chord.
+    The correction of X Y Z is linear in the workpiece, so only the tip error can leave its chord.
     """
     rotary, most_far = intent.machine.rotary, np.maximum(farthest(start), farthest(end))
     most = bow.of(np.abs(end - start), most_far, tool_length, rotary, acceleration)[0] + CLOSE
@@ -146,7 +146,7 @@ def tcp_bounds(
 def straight_bounds(
     bow: DeviationBounds, start: Array, end: Array, shifts: tuple[Array, Array], tool_lengths: Array, linear: Mask
 ) -> Array:
-    """As `bounds`, of straight motions (k, n_axes) between corrected ends, with `shifts` of their linear axes there."""
+    """`bounds` of straight motions between corrected ends (k, n_axes); `shifts`: corrections of linear axes there."""
     most_far = np.maximum(farthest(start), farthest(end))
     least, angle = bow.of(np.abs(end - start), most_far, float(np.abs(tool_lengths).max()), ~linear)
     sizes = [lengths(each) for each in (*shifts, shifts[1] - shifts[0])]
@@ -157,9 +157,9 @@ def straight_bounds(
 def deviations_seen(
     intent: Intent, real: Segments, rows: Index, check_start: Mask, per_bend: float, least: int, often: Array
 ) -> Array:
-    """As `deviations`, (k,) mm, by samples alone: at least so many, and so many for each time the error may bend.
+    """(k,) largest deviation by samples, mm: `per_bend` for each time that the error may bend, at least `least`.
 
-    often  (k,) times that it may bend along each motion
+    often  (k,) number of times that the error may bend along each motion
     """
     counts, fraction = interior(intent, real, rows, per_bend, least, often)
     starts = np.flatnonzero(check_start[rows])
@@ -172,16 +172,16 @@ def deviations_seen(
 
 
 def distance(intent: Intent, real: Segments, rows: Index, fraction: Array) -> Array:
-    """How far the tip is from where it could be at fractions of motions done as `real` has them, (k,) mm."""
+    """(k,) deviation of the tip at fractions of corrected motions, mm, without the part that no word could correct."""
     commands = real.at(rows, fraction)
     gap = correctable(intent, rows, commands, intent.gap(rows, fraction, commands))
     return np.sqrt(np.einsum("ij,ij->i", gap, gap))
 
 
 def beside(intent: Intent, real: Segments, rows: Index) -> Array | None:
-    """How far axes that get no word are at most from where they should be on the way of motions `rows` (k,).
+    """(n, n_axes) largest distance of axes that get no word from where they should be inside motions `rows` (k,), mm.
 
-    (n, n_axes) mm, 0 for other axes and motions, without the ends of motions; None if there are no such axes.
+    0 for all other axes and motions; the ends of motions are not included. None if there are no such axes.
     """
     on = rows[lacking(intent, rows)]
     if not on.size:
@@ -197,9 +197,10 @@ def beside(intent: Intent, real: Segments, rows: Index) -> Array | None:
 
 
 def starts_to_check(intent: Intent, unchanged: Mask) -> Mask:
-    """Motions that may not begin where they should, though the one before ended where it should, (n,).
+    """(n,) motions that may not begin where they should, even if the motion before ends where it should.
 
-    Because that one is unchanged, or ended with another tool, or elsewhere, or because an axis reverses.
+    Reasons: that motion is unchanged, or ended with another tool length or elsewhere; an axis reverses; the state has
+    an input for each motion.
     """
     moves = intent.moves
     check_start = np.ones(len(moves), dtype=bool)
@@ -215,20 +216,20 @@ def starts_to_check(intent: Intent, unchanged: Mask) -> Mask:
 
 
 BATCH = 16_384
-"""Samples worked on at a time."""
+"""Number of samples worked on at a time."""
 STRAIGHT = 0.05
-"""Pieces over which the error may bend by less than that many times are looked at where they end: an eighth of a wave
-is once, so that in between the error is within 0.0002 of itself of the straight line between those at the ends."""
+"""Number of bends of the error below which a piece is sampled at its end only. One bend is an eighth of a wave, so
+inside such a piece the error is within 0.0002 of itself of the straight line between those at the ends."""
 START = 1e-6
-"""Fraction of a motion at which its start is looked at."""
+"""Fraction of a motion at which its start is sampled."""
 
 
 def path_error(written: WrittenPieces, rows: Mask | None = None, known: Known | None = None) -> PathError:
     """Tip errors of the real machine along the whole path, by simulation.
 
     written  pieces with the ends as the control will understand them (`Emission.end`, `.centre`)
-    rows     (n,) motions to look at; all corrected ones if not given
-    known    what has been found out of the ends of motions; they are not looked at again then
+    rows     (n,) motions to examine; None: all corrected ones
+    known    tip errors at the ends of motions, so that these need not be computed again
     """
     pieces, moves = written.pieces, written.intent.moves
     chosen = ~pieces.unchanged if rows is None else rows[pieces.move]
@@ -241,7 +242,10 @@ def path_error(written: WrittenPieces, rows: Mask | None = None, known: Known | 
 
 
 def _beside(written: WrittenPieces, chosen: Mask) -> PathSamples | None:
-    """Where the tool goes beside contours, of pieces `chosen` (m,): for the largest errors, and no share of the way."""
+    """Samples of the offset path of the tool beside contours, for pieces `chosen` (m,).
+
+    Their weight is 0: they count for the largest errors, not for the rms.
+    """
     moves = written.intent.moves
     if moves.beside is None:
         return None
@@ -257,9 +261,9 @@ def _beside(written: WrittenPieces, chosen: Mask) -> PathSamples | None:
 def samples(
     written: WrittenPieces, which: Index, known: Known | None = None, check_start: Mask | None = None
 ) -> Iterator[PathSamples]:
-    """Look at pieces `which`, in batches; what is known of their ends need not be looked at.
+    """The tip errors along pieces `which`, in batches; errors known at ends are not computed again.
 
-    check_start  (n,) motions whose start is looked at, too, if that is known
+    check_start  (n,) motions whose start is sampled, too; None: worked out here
     """
     counts, along = _counts(written, which)
     if check_start is None:
@@ -270,7 +274,7 @@ def samples(
 
 
 def _counts(written: WrittenPieces, which: Index) -> tuple[Index, Mask]:
-    """Samples inside each piece, ends left out, and which pieces are looked at along the way, not at the end only."""
+    """(k,) number of samples inside each piece, and whether it is sampled along its way, not only at its end."""
     intent, move, span = written.intent, written.pieces.move[which], written.span[which]
     wished, kind = bends_closely(intent, move) * span, intent.moves.kind[move]
     along = ((kind == MotionKind.FEED) | (kind == MotionKind.ARC)) & (span > 2 * INSTANT) & intent.moving(move)
@@ -281,7 +285,7 @@ def _counts(written: WrittenPieces, which: Index) -> tuple[Index, Mask]:
 
 
 def _places(written: WrittenPieces, which: Index, counts: Index, along: Mask, check_start: Mask) -> tuple[Index, Array]:
-    """Pieces and fractions of them to look at: evenly, at the end, at kinks, and at starts that may be off."""
+    """Pieces and fractions of them to sample: evenly, at the end, at kinks, and at starts that may be off; flat."""
     many = counts + 1
     fraction = (places(many) + 1) / np.repeat(many, many)
     begins = np.flatnonzero(written.before[which] == 0)
@@ -296,10 +300,10 @@ def _places(written: WrittenPieces, which: Index, counts: Index, along: Mask, ch
 
 
 def _starts_to_check(written: WrittenPieces) -> Mask:
-    """Motions whose start the end of the one before does not show: also those behind rapids, (n,).
+    """(n,) motions whose start is to be sampled, because it is not shown by the end of the motion before.
 
-    Not behind rapids of which an axis is left where it stands: what that leaves is said by itself, and seen in a cut
-    only where it has to be led aside (`_leaps`).
+    Motions behind rapids are added, except if an axis of the rapid was left where it stands: that is reported on its
+    own (NCF439), and shows in a cut only if the cut has to be led to its start (`_leaps`).
     """
     moves = written.intent.moves
     unchanged = np.ones(len(moves), dtype=bool)
@@ -310,10 +314,10 @@ def _starts_to_check(written: WrittenPieces) -> Mask:
 
 
 def _leaps(written: WrittenPieces, which: Index) -> Mask:
-    """Of pieces with which motions begin, those that lead a cut to where it should begin.
+    """(k,) whether a piece, with which a motion begins, leads a cut from a displaced place to where it should begin.
 
-    They come from where axes were left, or from a hole: the place is right at its bottom, and not at the level to which
-    the cycle goes back.
+    The place is displaced because axes were left there, or because a cycle ended there: it is right at the bottom of
+    the hole, not at the level to which the cycle returns.
     """
     moves, move = written.intent.moves, written.pieces.move[which]
     behind = (
@@ -326,22 +330,22 @@ def _leaps(written: WrittenPieces, which: Index) -> Mask:
 
 
 def _passed(written: WrittenPieces, which: Index, along: Mask) -> tuple[Index, Array]:
-    """Where pieces pass a kink or a jump: which of them, and fraction."""
+    """Where pieces `which` pass a kink or a jump: index in `which`, and fraction, flat."""
     long = np.flatnonzero(along)
     on, share = passed(written.intent, *(picked(each, which[long]) for each in written.ends))
     return long[on], share
 
 
 def _errors(written: WrittenPieces, piece: Index, fraction: Array, known: Known | None) -> PathSamples:
-    """The errors at fractions of pieces (k,); those at ends where they are known are taken from there."""
+    """The tip errors at fractions of pieces (k,); those known at ends are taken from `known`."""
     move, at = written.pieces.move[piece], written.before[piece] + fraction * written.span[piece]
     before, after = np.empty(len(piece)), np.empty(len(piece))
     unknown = np.ones(len(piece), dtype=bool)
     ends = np.flatnonzero(fraction == 1.0)
     if known is not None:
-        here, *found = known.at(written, piece[ends])
-        before[ends], after[ends] = found
-        unknown[ends[here]] = False
+        is_known, *errors = known.at(written, piece[ends])
+        before[ends], after[ends] = errors
+        unknown[ends[is_known]] = False
     rows = np.flatnonzero(unknown)
     if rows.size:
         commands = written.segments.at(piece[rows], fraction[rows])
@@ -350,7 +354,7 @@ def _errors(written: WrittenPieces, piece: Index, fraction: Array, known: Known 
 
 
 def errors_at(intent: Intent, move: Index, fraction: Array, commands: Array) -> tuple[Array, Array]:
-    """The errors at fractions of motions (k,) as programmed, and under `commands` (k, n_axes) instead, mm."""
+    """(k,) tip errors at fractions of motions as programmed, and with `commands` (k, n_axes) instead, mm."""
     programmed = intent.segments.at(move, fraction)
     done = [intent.joints(move, each) for each in (programmed, commands)]
     gaps = intent.gaps(move, programmed, done, intent.states(move, fraction))
@@ -359,7 +363,7 @@ def errors_at(intent: Intent, move: Index, fraction: Array, commands: Array) -> 
 
 
 def _way(written: WrittenPieces, piece: Index) -> Array:
-    """The part of the way that each sample stands for, mm: its piece's chord shared out, or arc length."""
+    """(k,) the way for which each sample stands, mm: the chord or arc length of its piece, divided by its samples."""
     segments = written.segments
     first = np.flatnonzero(np.diff(piece, prepend=-1))
     counts, own = np.diff(first, append=len(piece)), piece[first]

@@ -1,18 +1,20 @@
-"""The corrected ends of motions, in bulk: where each really starts and ends, and what cannot be corrected and why.
+"""The corrected ends of motions: where each motion really starts and ends, and which cannot be corrected, and why.
 
-An unchanged motion moves the axes that it names to where it says, and leaves the others where the corrected motions
-before it have left them; an unchanged increment starts from there. So what matters is the displacement of each axis
-from where the program believes it to be, and which motions take it away.
+An unchanged motion moves the axes that it names to their programmed place. The other axes keep the displacement that
+earlier corrected motions gave them, and an unchanged increment starts from it. So for each axis the displacement from
+its programmed position is followed from motion to motion.
 
-A canned cycle has one place in its plane, that of the bottom of the hole. Of the level from which it feeds, and to
-which it may return (R), only the height is its own; that is corrected, too.
+A canned cycle has one place in its plane, that of the bottom of the hole. The level from which it feeds, and to which
+it may return (R), has only a height of its own; this is corrected, too.
 
-Some rotary axes stay as programmed, though the strategy would correct them. One that must get no word stays where it
-stands. And in a plane that was swivelled without tool-centre-point control the control moves linear axes as if the
-rotary axes stood still for good: turned by a correction, they would take the tip along. An axis whose angles a control
-may count from 0 to 360 degrees stays within them where the program does: on such a control -0.001 is 359.999, and leads
-it round, or is an alarm, and the sign of a word may even be the sense of the turn. Source: Siemens, "SINUMERIK 840D sl,
-axes and spindles", R2, MD30455; Fanuc 30i parameter manual, No. 1008.
+Some rotary axes stay as programmed although the strategy would correct them:
+
+- an axis that must get no word stays where it stands;
+- in a plane that was swivelled without tool-centre-point control, the control moves the linear axes as if the rotary
+  axes stood still; a rotary correction would move the tip;
+- an axis whose angles a control may count from 0 to 360 degrees stays within them if the program does. On such a
+  control -0.001 means 359.999, which leads it round or is an alarm, and the sign may even give the sense of the turn.
+  Source: Siemens, "SINUMERIK 840D sl, axes and spindles", R2, MD30455; Fanuc 30i parameter manual, No. 1008.
 """
 
 from __future__ import annotations
@@ -37,7 +39,7 @@ from ncfix.writer.target import FrameMap
 
 @frozen
 class EndCommands:
-    """Commands at which each motion really starts and ends, (n, n_axes) mm and rad, before rounding; NaN if unknown."""
+    """The commands at which motions really start and end, (n, n_axes) mm and rad, before rounding; NaN if unknown."""
 
     start: Array
     end: Array
@@ -51,12 +53,12 @@ def standing(
     before: Array | None = None,
     approaches: Array | None = None,
 ) -> EndCommands:
-    """Where each motion starts and ends if all that are not `unchanged` (n,) end at `wanted` (n, n_axes).
+    """Where each motion really starts and ends. Axes that must get no word stay where they stand.
 
-    Axes that must get no word stay where they stand.
-
-    before      (n_axes,) how far off the axes stand at the start of the first motion; not at all if not given
-    approaches  (n, n_axes) where canned cycles feed from, and may return to; NaN, or not given: as programmed
+    wanted      (n, n_axes) corrected commands at the ends of the motions
+    unchanged   (n,) motions that are left as they are, whatever `wanted` says
+    before      (n_axes,) displacement of the axes at the start of the first motion; None: zero
+    approaches  (n, n_axes) corrected commands at the level R of canned cycles; NaN, or None: as programmed
     """
     shift = wanted - moves.end
     shift[~np.isfinite(shift)] = 0.0
@@ -66,13 +68,13 @@ def standing(
         decides[unchanged] &= (moves.moved & ~moves.increments)[unchanged]
     if _goes_on(moves):
         first = np.zeros((1, shift.shape[1])) if before is None else before[None]
-        left = _carried(shift, decides, first)
-        return EndCommands(moves.start + left[:-1], moves.end + left[1:])
+        displacement = _carried(shift, decides, first)
+        return EndCommands(moves.start + displacement[:-1], moves.end + displacement[1:])
     back, restarts = (np.zeros(moves.start.shape, dtype=bool) for _ in range(2))
     back[:-1] = (moves.start[1:] == moves.start[:-1]) & (moves.end[:-1] != moves.start[:-1])
     back &= (moves.kind == MotionKind.CYCLE)[:, None]  # a canned cycle has returned to where it started
     same: Mask = (moves.start[1:] == moves.end[:-1]) | (np.isnan(moves.start[1:]) & np.isnan(moves.end[:-1]))
-    restarts[1:] = ~same & ~back[:-1]  # the control has taken an axis elsewhere itself
+    restarts[1:] = ~same & ~back[:-1]  # the control itself has moved an axis in between
     jumps, risen = _risen(moves, approaches)
     back[:-1] &= ~risen[1:]
     restarts |= risen
@@ -88,32 +90,37 @@ def standing(
 
 
 def _goes_on(moves: Moves) -> bool:
-    """Whether every motion begins where the one before ended, and commands mean the same all along."""
+    """Whether every motion begins where the one before ended, and TCP and its tool length never change."""
     joined = bool((moves.start[1:] == moves.end[:-1]).all()) and not (moves.kind == MotionKind.CYCLE).any()
     return joined and len(_runs(moves)) == 1
 
 
 def _carried(shift: Array, decides: Mask, first: Array) -> Array:
-    """Displacements before and behind motions that go on from each other, (n + 1, n_axes): `first`, then as decided.
+    """(n + 1, n_axes) displacements before the first motion (`first`) and behind each of n consecutive motions.
 
-    Where a motion does not decide, it is that of the motion before.
+    If a motion does not decide the displacement of an axis, the axis keeps that of the motion before.
     """
-    found = np.concatenate([first, shift])
+    displacement = np.concatenate([first, shift])
     open_ = np.flatnonzero(~every(decides))
     near = distinct(np.concatenate([open_, open_ + 1]))
     decided = np.concatenate([np.ones_like(decides[:1]), decides])[near]
     last = np.maximum.accumulate(np.where(decided, np.arange(len(near))[:, None], 0), axis=0)
-    found[near] = np.take_along_axis(found[near], last, axis=0)
-    return found
+    displacement[near] = np.take_along_axis(displacement[near], last, axis=0)
+    return displacement
 
 
 def _filled(
     shift: Array, decides: Mask, back: Mask, jumps: Array, restarts: Mask, before: Array
 ) -> tuple[Array, Array, Array]:
-    """Displacements at the starts and ends of a run of motions, and what is carried on behind it.
+    """Displacements at the starts and at the ends of a run of motions (n, n_axes), and that carried on behind it.
 
-    Starts and ends are put in one sequence; each takes the last value that was decided before it. Where a motion
-    restarts, the displacement is that of `jumps`.
+    Starts and ends are put in one sequence; each takes the last value that was decided before it.
+
+    shift     (n, n_axes) displacements at the ends of motions that decide them
+    decides   (n, n_axes) the motion decides the displacement of the axis
+    back      (n, n_axes) the axis returns to the start of the motion, so its displacement is not carried on
+    jumps     (n, n_axes) displacements at the starts where `restarts`
+    before    (n_axes,) displacement before the run
     """
     n, n_axes = shift.shape
     values = np.zeros((2 * n + 1, n_axes))
@@ -128,7 +135,7 @@ def _filled(
 
 
 def _risen(moves: Moves, approaches: Array | None) -> tuple[Array, Mask]:
-    """Where motions start at the level from which the cycle before them fed, and how far that is off, (n, n_axes)."""
+    """(n, n_axes) displacement of level R of the cycle before a motion, and whether the motion starts at that level."""
     off, risen = np.zeros(moves.start.shape), np.zeros(moves.start.shape, dtype=bool)
     if moves.approach is not None and approaches is not None:
         at_level = (moves.start[1:] == moves.approach[:-1]) & (moves.start[1:] != moves.end[:-1])
@@ -138,7 +145,7 @@ def _risen(moves: Moves, approaches: Array | None) -> tuple[Array, Mask]:
 
 
 def _runs(moves: Moves) -> list[slice]:
-    """Stretches over which commands mean the same: no change of tool-centre-point control or of its tool length."""
+    """Stretches of motions in which neither tool-centre-point control nor its tool length changes."""
     length = np.where(moves.tcp, moves.length_under_tcp, 0.0)
     changes = np.flatnonzero((np.diff(moves.tcp.astype(np.int8)) != 0) | (np.diff(length) != 0)) + 1
     ends = [*changes.tolist(), len(moves)]
@@ -146,7 +153,10 @@ def _runs(moves: Moves) -> list[slice]:
 
 
 def _translated(machine: Machine, moves: Moves, row: int, shift: Array) -> Array:
-    """The displacement behind motion row - 1 in the commands of motion row, where they mean something else."""
+    """The displacement (n_axes,) behind motion row - 1, in terms of the commands of motion `row`.
+
+    The two differ if tool-centre-point control or its tool length changes between them.
+    """
     here, there = np.array([row]), np.array([row - 1])
     if not np.any(shift) or not np.isfinite(moves.end[there]).all() or not np.isfinite(moves.start[here]).all():
         return shift
@@ -160,9 +170,12 @@ def _translated(machine: Machine, moves: Moves, row: int, shift: Array) -> Array
 
 
 def corrected_approaches(intent: Intent, wanted: Array, unchanged: Mask) -> Array | None:
-    """(n, n_axes) where cycles that are not `unchanged` (n,) shall feed from, if they end at `wanted` (n, n_axes).
+    """(n, n_axes) corrected commands at the level R from which canned cycles feed; None if no motion is a cycle.
 
-    NaN where there is no such level, or it cannot be corrected; None if there is none at all.
+    wanted     (n, n_axes) corrected commands at the bottoms of the holes
+    unchanged  (n,) motions that are not corrected
+
+    NaN for motions without such a level, and where it cannot be corrected.
     """
     moves = intent.moves
     if moves.approach is None:
@@ -175,7 +188,7 @@ def corrected_approaches(intent: Intent, wanted: Array, unchanged: Mask) -> Arra
 
 
 def _steered(intent: Intent, rows: Index, nominal: Array, wanted: Array) -> tuple[Array, Mask]:
-    """Commands that bring the tip of the real machine to the level, rotary axes as at the bottom of the hole."""
+    """Commands that bring the tip of the real machine to level R, rotary axes as at the bottom, and which arrived."""
     moves, machine = intent.moves, intent.machine
     meant = intent.joints(rows, nominal)
     q = np.where(machine.rotary, intent.joints(rows, wanted), meant)
@@ -189,7 +202,7 @@ def _steered(intent: Intent, rows: Index, nominal: Array, wanted: Array) -> tupl
 
 
 def _over_the_hole(moves: Moves, rows: Index, commands: Array, wanted: Array) -> Array:
-    """Commands (k, n_axes) moved over the bottom of their hole, in the frame of the program."""
+    """Commands (k, n_axes) moved over the bottom of their hole; only their height in the program's frame is kept."""
     assert moves.approach is not None
     result = commands.copy()
     for number in sorted(set(moves.frame[rows].tolist())):
@@ -205,31 +218,34 @@ def _over_the_hole(moves: Moves, rows: Index, commands: Array, wanted: Array) ->
 
 FULL = 2 * math.pi
 NO_ANGLE = 1e-9
-"""rad"""
+"""Angle, rad, that counts as none."""
 
 
 def with_rotary_held(
     intent: Intent, strategy: Strategy, move: Index, fraction: Array, q: Array, correction: Correction
 ) -> Correction:
-    """The `correction` of poses q (k, n_axes) of motions `move`, but for rotary axes that are held."""
+    """The `correction` of poses q (k, n_axes) of motions `move` (k,), with held rotary axes as programmed.
+
+    X Y Z are solved again for poses in which a rotary axis is held; see `held_axes` and `on_their_side`.
+    """
     if not strategy.corrects_orientation:
         return correction
-    there = on_their_side(intent, move, q, np.where(held_axes(intent, move), q, correction.q))
-    rows = np.flatnonzero((there != correction.q)[:, intent.machine.rotary].any(axis=1))
+    held = on_their_side(intent, move, q, np.where(held_axes(intent, move), q, correction.q))
+    rows = np.flatnonzero((held != correction.q)[:, intent.machine.rotary].any(axis=1))
     if not rows.size:
         return correction
     target = intent.machine.tip(q[rows], intent.lengths(move[rows]))
     corrected, converged, oriented = correction.q.copy(), correction.converged.copy(), correction.oriented.copy()
-    corrected[rows], arrived = steer(intent.machine, there[rows], target, intent.states(move[rows], fraction[rows]))
+    corrected[rows], arrived = steer(intent.machine, held[rows], target, intent.states(move[rows], fraction[rows]))
     converged[rows] &= arrived
     oriented[rows] = False
     return Correction(corrected, converged, oriented)
 
 
 def on_their_side(intent: Intent, move: Index, q: Array, corrected: Array) -> Array:
-    """Corrected positions (k, n_axes); not below zero or past a full turn where the program never is.
+    """Corrected positions (k, n_axes), clipped to 0 to 360 degrees for each rotary axis that never leaves them.
 
-    Directions that are given as vectors lead the axes as the control thinks best.
+    Nothing is clipped if the program gives tool directions as vectors: then the control chooses the angles.
     """
     moves = intent.moves
     if moves.angles is None or moves.pointing is not None:
@@ -242,7 +258,7 @@ def on_their_side(intent: Intent, move: Index, q: Array, corrected: Array) -> Ar
 
 
 def held_axes(intent: Intent, move: Index) -> Mask:
-    """(k, n_axes) rotary axes that motions must not turn but as programmed."""
+    """(k, n_axes) rotary axes that must stay as programmed in motions `move` (k,)."""
     held = np.zeros((len(move), len(intent.machine.axes)), dtype=bool)
     if intent.moves.rotary_as_programmed is not None:
         held |= intent.moves.rotary_as_programmed[move][:, None] & intent.machine.rotary
@@ -252,18 +268,18 @@ def held_axes(intent: Intent, move: Index) -> Mask:
 
 
 BATCH = 32_768
-"""Ends corrected at a time."""
+"""Number of ends corrected at a time."""
 
 
 @frozen
 class Ends:
-    """Where motions shall end.
+    """The corrected ends of motions.
 
-    wanted    (n, n_axes) commands; those of the program where nothing is corrected
-    failed    (n,) motions that should be corrected and cannot
+    wanted    (n, n_axes) commands; the programmed ones for motions that are not corrected
+    failed    (n,) motions that should be corrected and cannot be
     oriented  (n,) the tool direction is corrected too, without damping or limits
-    findings  why they cannot
-    before    (n,) mm: how far the tip is off without a correction; NaN where that is not known
+    findings  why motions failed
+    before    (n,) tip error without a correction, mm; NaN if not known
     """
 
     wanted: Array
@@ -274,7 +290,7 @@ class Ends:
 
 
 def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
-    """Correct the ends of motions `rows`."""
+    """The corrected ends of motions `rows` (k,)."""
     moves = intent.moves
     ones = np.ones(len(rows))
     q = intent.joints_at(rows, ones)
@@ -306,7 +322,7 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
 
 
 def with_rotary_as_it_stands(intent: Intent, ends: Ends, unchanged: Mask, before: Array | None) -> Ends:
-    """The ends with X Y Z for rotary axes that get no word, where corrections before have left these."""
+    """The ends with X Y Z solved again for rotary axes that get no word, and so stand where corrections left them."""
     if intent.idle is None:
         return ends
     stands = standing(intent.machine, intent.moves, ends.wanted, unchanged, before).end
@@ -315,14 +331,14 @@ def with_rotary_as_it_stands(intent: Intent, ends: Ends, unchanged: Mask, before
     if not rows.size:
         return ends
     commands = np.where(off[rows], stands[rows], ends.wanted[rows])
-    found, arrived = intent.aimed(rows, np.ones(len(rows)), commands)
+    aimed, arrived = intent.aimed(rows, np.ones(len(rows)), commands)
     wanted = ends.wanted.copy()
-    wanted[rows[arrived]] = found[arrived]
+    wanted[rows[arrived]] = aimed[arrived]
     return replace(ends, wanted=wanted)
 
 
 def _solved(intent: Intent, strategy: Strategy, rows: Index, q: Array) -> Correction:
-    """The correction of ends q (k, n_axes) of motions; where one depends on others, of all of them at once."""
+    """The correction of ends q (k, n_axes) of motions `rows` (k,), in batches if no end depends on another."""
     ones = np.ones(len(rows))
     if strategy.corrects_orientation:
         found = strategy.solve(intent.machine, q, intent.states(rows, ones), along(intent, rows, ones))
@@ -338,10 +354,10 @@ def _solved(intent: Intent, strategy: Strategy, rows: Index, q: Array) -> Correc
 
 
 def as_commands(intent: Intent, rows: Index, programmed: Array, nominal: Array, corrected: Array) -> Array:
-    """Commands of corrected axis positions (k, n_axes); where nothing is corrected exactly those of the program.
+    """The commands of corrected axis positions (k, n_axes); exactly the programmed ones where nothing is corrected.
 
-    programmed  (k, n_axes) commands of the program
-    nominal     (k, n_axes) axis positions of the program
+    programmed  (k, n_axes) programmed commands
+    nominal     (k, n_axes) programmed axis positions
     """
     tcp, lengths = intent.moves.tcp[rows], intent.moves.length_under_tcp[rows]
     if not tcp.any():
@@ -352,15 +368,15 @@ def as_commands(intent: Intent, rows: Index, programmed: Array, nominal: Array, 
 def commands_of_positions(
     machine: Machine, programmed: Array, positions: tuple[Array, Array], tcp: Mask, lengths: ArrayLike
 ) -> Array:
-    """As `as_commands`; `positions` are those of the program and the corrected ones, `tcp` and lengths as there."""
+    """Like `as_commands`, for `positions` (programmed, corrected), with `tcp` (k,) and tool lengths, mm, given."""
     nominal, corrected = positions
-    here, there = (commands_from_joints(machine, q, tcp, lengths) for q in positions)
+    before, after = (commands_from_joints(machine, q, tcp, lengths) for q in positions)
     still = every(nominal == corrected)[:, None]
-    return programmed + np.where(still, 0.0, there - here)
+    return programmed + np.where(still, 0.0, after - before)
 
 
 def along(intent: Intent, rows: Index, fraction: Array) -> PoseSequence:
-    """How the ends of motions follow each other, for limits on rates; an unchanged motion begins a new stretch."""
+    """The ends of motions `rows` as a path, for limits on rates; behind omitted motions a new stretch begins."""
     q = intent.joints_at(rows, fraction)
     tips = intent.machine.tip(q, intent.lengths(rows))
     begins = np.ones(len(rows), dtype=bool)
@@ -369,7 +385,7 @@ def along(intent: Intent, rows: Index, fraction: Array) -> PoseSequence:
 
 
 def path_of(intent: Intent, q: Array, tips: Array, begins: Mask, pinned: Mask, decided: Array) -> PoseSequence:
-    """The `PoseSequence` of poses q (k, n_axes) with tips (k, 3); `decided` (k, n_axes) corrections of pinned poses."""
+    """The `PoseSequence` of poses q (k, n_axes) with tips (k, 3), mm; `decided` (k, n_axes): those of pinned poses."""
     rotary = intent.machine.rotary
     travel_mm, travel_rad = np.zeros(len(q)), np.zeros(len(q))
     travel_mm[1:] = np.linalg.norm(np.diff(tips, axis=0), axis=1)
@@ -385,10 +401,9 @@ def with_closed_circles(
     before: Array | None = None,
     approaches: Array | None = None,
 ) -> Array:
-    """Full circles made to end, within their plane, exactly where they really start.
+    """The wanted ends, with full circles that end, within their plane, exactly where they really start.
 
-    Only where that moves their end by no more than `within` mm. Of circles one after another all end where the first
-    one starts.
+    An end is moved by at most `within` mm, else it stays. Consecutive circles all end where the first one starts.
     """
     moves, columns = intent.moves, intent.columns
     rows = np.flatnonzero(intent.segments.arc & ~unchanged)

@@ -1,4 +1,4 @@
-"""Tip errors before and after a correction: of places on a path, and what is added up of all of them."""
+"""Tip errors before and after a correction: samples along a path, and the figures (max, rms) over all of them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ncfix.values import frozen
 class Figures:
     """Tip errors along a path.
 
-    max       mm
-    rms       mm, by length of way
-    move      the motion in which the largest is, -1 if there is none
-    fraction  where on it
+    max       largest, mm
+    rms       root mean square, weighted by length of way, mm
+    move      the motion with the largest error, -1 if there is none
+    fraction  the fraction of that motion
     """
 
     max: float
@@ -26,11 +26,11 @@ class Figures:
 
 @frozen
 class PathError:
-    """Before and after a correction.
+    """Tip errors before and after a correction.
 
-    before, after             figures over all motions looked at
-    samples                   how many places were looked at
-    way                       mm that they stand for
+    before, after  figures over all sampled motions
+    samples        number of samples
+    way            length of path that they stand for, mm
     """
 
     before: Figures
@@ -41,7 +41,7 @@ class PathError:
 
 @frozen
 class PathSamples:
-    """Places on a path, flat: motion, fraction, tip error before and after (mm), share of the way (mm)."""
+    """Samples on a path, flat: motion, fraction, tip error before and after, mm, and the way they stand for, mm."""
 
     move: Index
     fraction: Array
@@ -51,13 +51,17 @@ class PathSamples:
 
 
 def _early(at: tuple[float, int, float]) -> tuple[float, int, float]:
-    """Orders errors (mm) in motions and at fractions of these: of equal ones the first on the path is the largest."""
+    """Sort key of (error, motion, fraction): of equal errors, the first on the path is the largest."""
     error, move, fraction = at
     return error, -move, -fraction
 
 
 class FigureTally:
-    """Figures gathered batch by batch."""
+    """Adds up samples batch by batch to figures.
+
+    squares  sum of squares times way, mm^3, before and after
+    at       largest error, mm, with its motion and fraction, before and after
+    """
 
     def __init__(self) -> None:
         self.squares = [0.0, 0.0]
@@ -66,7 +70,7 @@ class FigureTally:
         self.samples = 0
 
     def add(self, part: PathSamples) -> None:
-        """Take in a batch; places at which an error is not known do not count."""
+        """Add a batch of samples. Samples with an unknown error (NaN) count as zero, and not in `samples`."""
         self.way += float(part.weight.sum())
         self.samples += int(np.count_nonzero(np.isfinite(part.after)))
         for side, error in enumerate((part.before, part.after)):
@@ -77,7 +81,7 @@ class FigureTally:
             self.at[side] = max(self.at[side], there, key=_early)
 
     def take(self, way: float, samples: int, squares: list[float], most: list[tuple[float, int, float]]) -> None:
-        """Take in what was added up elsewhere; of both sides way times squares and the most: mm, motion, fraction."""
+        """Add sums made elsewhere; `squares` and `most` before and after, as in `squares` and `at`."""
         self.way += way
         self.samples += samples
         self.squares = [own + more for own, more in zip(self.squares, squares, strict=True)]

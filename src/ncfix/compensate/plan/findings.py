@@ -1,6 +1,7 @@
-"""What the planner finds wrong: coded, by motion, in bulk. The caller knows the program and adds the places.
+"""Findings of the planner: coded problems and remarks with the motions that they concern.
 
-Findings of the parts of a program are put together in `Notes`: the first few are written out, the rest is counted.
+`Notes` collects the findings of the parts of a program, and makes messages of them: the first few are written out, the
+rest are counted.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ from ncfix.text.tree import Program
 from ncfix.values import frozen, mutable
 
 MOST = 20
-"""So many messages are written out; the rest is counted."""
+"""Largest number of messages of one kind that are written out; the rest are counted."""
 
 
 @frozen
 class Finding:
-    """One kind of trouble and the motions that have it.
+    """One kind of problem or remark, and the motions that it concerns.
 
     code    stable code, explained in `codes.py`
     moves   (k,) indices of the motions, ascending
@@ -30,8 +31,8 @@ class Finding:
     text    sentence with the fields `{value}`, `{axis}`, `{unit}` and `{range}`
     axes    (k,) axis letter per motion, or empty
     hint    what to do about it
-    turns   (k,) whether that axis is rotary, and the value in degrees; or empty
-    ranges  the range of each axis in words, by letter; or empty
+    turns   (k,) whether that axis is rotary, so that the value is in degrees; or empty
+    ranges  axis letter -> its range in words; or empty
     """
 
     code: str
@@ -45,21 +46,21 @@ class Finding:
 
     @classmethod
     def of(cls, code: str, moves: Index, text: str, hint: str = "") -> Finding:
-        """One without a figure."""
+        """A finding without figures."""
         return cls(code, moves, np.zeros(len(moves)), text, hint=hint)
 
     def __len__(self) -> int:
         return len(self.moves)
 
     def sentence(self, k: int) -> str:
-        """What is the matter with the k-th motion."""
+        """The sentence for the k-th motion, with its value, axis, unit and range."""
         axis = self.axes[k] if self.axes else ""
         unit = "degrees" if self.turns and self.turns[k] else "mm"
         range_ = self.ranges.get(axis, "")
         return self.text.format(value=float(self.values[k]), axis=axis, unit=unit, range=range_)
 
     def among(self, chosen: Sequence[bool]) -> Finding:
-        """Some of the motions, (k,)."""
+        """The finding for the chosen motions (k,) only."""
         rows = np.flatnonzero(np.array(chosen, dtype=np.bool_))
         axes = tuple(self.axes[row] for row in rows) if self.axes else ()
         turns = tuple(self.turns[row] for row in rows) if self.turns else ()
@@ -68,7 +69,7 @@ class Finding:
 
 @mutable(eq=False, slots=False)
 class PoseError(RefusedError):
-    """Poses that cannot be corrected; `rows` (n,) tells which of those given."""
+    """Poses that cannot be corrected; `rows` (n,): which of the given poses."""
 
     rows: Mask | None = None
 
@@ -85,18 +86,18 @@ ORDER = (
     *("NCF408", "NCF405", "NCF404", "NCF406", "NCF407"),
     *("NCF414", "NCF402", "NCF403", "NCF415", "NCF454", "NCF413", "NCF455", "NCF456", "NCF283", "NCF409", "NCF410"),
 )
-"""Findings in the order in which they are reported: those of limits, then those of a plan."""
+"""Codes in the order in which they are reported: those of limits, then those of a plan."""
 ONCE = frozenset({"NCF409", "NCF456", "NCF283"})
-"""Findings that hold for the whole program, and are told of its first motion only."""
+"""Codes that hold for the whole program, and are reported for its first motion only."""
 
 
 NoteKey = tuple[int, str, str, str]
-"""A position of block delete, a code, its text and hint."""
+"""(position of block delete, code, text, hint)."""
 
 
 @mutable
 class Found:
-    """Messages of one kind, the first few, and how many there are."""
+    """The first few messages of one kind, and the number of all."""
 
     shown: list[Message] = field(default_factory=list)
     count: int = 0
@@ -104,12 +105,12 @@ class Found:
 
 @mutable
 class Notes:
-    """Findings so far, by position of block delete, code, text and hint."""
+    """The findings so far, by position of block delete, code, text and hint."""
 
     found: dict[NoteKey, Found] = field(default_factory=dict)
 
     def add(self, finding: Finding, program: Program, moves: Moves, own: Mask | None = None, position: int = 0) -> None:
-        """Take in a finding of a part, in a position of block delete; of motions `own` (n,) if given."""
+        """Add a finding of a part, in a position of block delete; `own` (n,): the motions to include, None: all."""
         rows = np.arange(len(finding)) if own is None else np.flatnonzero(own[finding.moves])
         rows = rows[:1] if finding.code in ONCE else rows
         shown = []
@@ -119,7 +120,7 @@ class Notes:
         self._take((position, finding.code, finding.text, finding.hint), Found(shown, len(rows)))
 
     def take(self, other: Notes) -> None:
-        """Take in the findings of what comes behind."""
+        """Add the findings of a later part."""
         for key, found in other.found.items():
             self._take(key, found)
 
@@ -131,7 +132,7 @@ class Notes:
         note.count += found.count
 
     def messages(self) -> tuple[Message, ...]:
-        """What was found, in the order of one plan."""
+        """The messages, by position of block delete and in `ORDER`, without duplicates."""
         messages: list[Message] = []
         for (_, code, *_), note in sorted(self.found.items(), key=lambda each: (each[0][0], ORDER.index(each[0][1]))):
             messages += note.shown

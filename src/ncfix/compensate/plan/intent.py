@@ -1,17 +1,16 @@
-"""The intended path: what a perfect machine does with the program, and how far a real one is from it.
+"""The intended path: the tip of a perfect machine that follows the program, and the gap of a real one to it.
 
 A control interpolates commands: X Y Z and the rotary axes linearly with the fraction of the block, arcs on their
-circles; with tool-centre-point control the linear axes follow from that at every instant. The intended path is where
-the tool tip of a perfect machine is in the workpiece meanwhile.
+circles. With tool-centre-point control the linear axes follow from that at every instant. The intended path is that of
+the tool tip of a perfect machine in the workpiece.
 
-Actual and intended tip are compared at the same fraction of the block: the tool has a certain direction and feed
-there, which belong to that point of the workpiece and no other. The distance so found is never less than that to the
-nearest point of the intended path.
+Actual and intended tip are compared at the same fraction of the block, because tool direction and feed there belong to
+that point of the workpiece. The distance is never less than that to the nearest point of the intended path.
 
-Some axes must get no word, because only the machine knows where they stand. Such an axis stays there, and what its
-correction would do is left undone until the program names it. All other corrections are those of the exact solution, so
-what is left at the tip lies along the axes without words, but for the error times how it changes over so small a way.
-Deviations are taken without that part: no splitting, and no other word, could take it away.
+Some axes must get no word, because only the machine knows where they stand. Such an axis stays there, and its
+correction is not made until the program names it. All other corrections are those of the exact solution, so the error
+left at the tip lies along the axes without words, except for second-order terms. Deviations are taken without that
+part, because no splitting and no other word could remove it.
 """
 
 from __future__ import annotations
@@ -44,17 +43,17 @@ from ncfix.machine import Machine, State
 from ncfix.values import frozen
 
 INSTANT, WHILE = 1e-4, 1e-3
-"""Fractions of a motion over which it is looked at which way its axes go: around an instant, and for a while before."""
+"""Fractions of a motion by which the direction of its axes is found: around an instant, and for a while before it."""
 NOISE = 1e-11
-"""mm or rad; what axis positions may differ by for rounding of the arithmetic."""
+"""Largest difference, mm or rad, of axis positions by rounding of the arithmetic."""
 
 
 @frozen(slots=False)
 class Intent:
-    """A program on a machine.
+    """The motions of a program on a machine, and the intended path that follows from them.
 
-    state  what else the errors depend on; `inputs` are numbers or one number per motion. Tool length and direction of
-           motion are taken from the motions; its direction is the way in which the axes came to the first of them.
+    state  `inputs`: further quantities on which errors depend, each a number or one number per motion; `direction`:
+           direction in which the axes came to the start of the first motion. The tool length comes from the motions.
     """
 
     machine: Machine
@@ -67,21 +66,21 @@ class Intent:
 
     @cached_property
     def columns(self) -> Index:
-        """The columns of X, Y, Z."""
+        """(3,) the columns of X, Y and Z."""
         return linear_columns(self.machine)
 
     @cached_property
     def segments(self) -> Segments:
-        """The motions as geometry in command space."""
+        """The programmed motions as lines and arcs of commands."""
         return Segments.of_moves(self.moves, self.columns)
 
     @cached_property
     def curved(self) -> Mask:
-        """Motions whose axes do not move linearly with the fraction, (n,)."""
+        """(n,) motions whose axes do not move linearly with the fraction: arcs, and motions under TCP."""
         return np.asarray((self.moves.kind == MotionKind.ARC) | self.moves.tcp, dtype=bool)
 
     def moving(self, rows: Index) -> Mask:
-        """Which of motions `rows` (k,) are to move anything; others only take up what is off where they begin."""
+        """(k,) whether motions `rows` move an axis as programmed; others only take up a displacement at their start."""
         way = np.abs(picked(self.moves.end, rows) - picked(self.moves.start, rows))
         return some((way >= REST) & (way < np.inf)) | (self.moves.kind[rows] == MotionKind.ARC)
 
@@ -99,23 +98,23 @@ class Intent:
 
     @cached_property
     def mute(self) -> Mask | None:
-        """(n, 3) which of X, Y and Z they are; None if none anywhere."""
+        """(n, 3) which of X, Y and Z must get no word, see `wordless`; None if there are none."""
         mute = None if self.wordless is None else self.wordless[:, self.columns]
         return mute if mute is not None and mute.any() else None
 
     @cached_property
     def kinks(self) -> list[tuple[int, Array]]:
-        """The axes (columns) with kinks or jumps of the error model, and where these are, ascending, mm and rad."""
+        """The axes (columns) with kinks or jumps of the error model, and their positions, ascending, mm and rad."""
         return list(self.machine.kinks)
 
     def joints(self, rows: Index, commands: Array) -> Array:
-        """Axis positions of commands (k, n_axes) of motions `rows` (k,); NaN where they cannot be reached."""
+        """(k, n_axes) axis positions of commands (k, n_axes) of motions `rows` (k,); NaN if they cannot be reached."""
         moves = self.moves
         q, reached = reached_joints(self.machine, commands, moves.tcp[rows], moves.length_under_tcp[rows])
         return q if reached.all() else np.where(reached[:, None], q, np.nan)
 
     def joints_at(self, rows: Index, fraction: Array) -> Array:
-        """Axis positions of a perfect control at fractions of motions."""
+        """(k, n_axes) programmed axis positions at fractions (k,) of motions `rows` (k,)."""
         if self._tcp and len(rows):
             if (fraction == 1).all():
                 return picked(self.ends[1], rows)
@@ -129,19 +128,19 @@ class Intent:
 
     @cached_property
     def ends(self) -> tuple[Array, Array]:
-        """Axis positions of a perfect control where motions start and where they end, (n, n_axes) each."""
+        """(n, n_axes) programmed axis positions at the starts, and at the ends, of motions."""
         return self.ends_of(np.arange(len(self.moves)), self.segments)
 
     def ends_of(self, rows: Index, segments: Segments) -> tuple[Array, Array]:
-        """Axis positions where segments (k,) start and where they end, (k, n_axes) each; `rows` (k,): their motions."""
+        """(k, n_axes) axis positions at the starts, and at the ends, of segments (k,); `rows` (k,): their motions."""
         with np.errstate(invalid="ignore"):
             start = segments.at(np.arange(len(rows)), np.zeros(len(rows)))
         return self.joints_of(rows, start, segments.end)
 
     def joints_of(self, rows: Index, start: Array, end: Array) -> tuple[Array, Array]:
-        """Axis positions at both ends, commands (k, n_axes), of motions `rows` (k,) or of pieces of them.
+        """(k, n_axes) axis positions at the starts, and at the ends, of motions `rows` (k,) or of pieces of them.
 
-        Where one starts as the one before it ends they are worked out once.
+        start, end  (k, n_axes) commands. If a start equals the end before it, it is computed once only.
         """
         at_end = self.joints(rows, end)
         if not self.moves.tcp[rows].any():
@@ -156,11 +155,11 @@ class Intent:
         return at_start, at_end
 
     def tip(self, rows: Index, fraction: Array) -> Array:
-        """The intended tool tip in the workpiece, (k, 3) mm."""
+        """(k, 3) the intended tool tip in the workpiece at fractions (k,) of motions `rows` (k,), mm."""
         return self.meant(rows, self.segments.at(rows, fraction))
 
     def meant(self, rows: Index, commands: Array) -> Array:
-        """Where commands (k, n_axes) of motions `rows` (k,) take the tip of a perfect machine, (k, 3) mm."""
+        """(k, 3) tip of a perfect machine in the workpiece under commands (k, n_axes) of motions `rows` (k,), mm."""
         tcp, beside = self.moves.tcp[rows], np.flatnonzero(self.moves.beside_tip[rows])
         if tcp.all() and not beside.size:
             return programmed_tip(self.machine, commands)
@@ -173,32 +172,32 @@ class Intent:
         return tip
 
     def lengths(self, rows: Index) -> Array:
-        """Tool lengths of motions: (k,) or () mm."""
+        """(k,) tool lengths of motions `rows`, mm; () if all are equal."""
         return common(self._lengths[rows])
 
     @cached_property
     def _lengths(self) -> Array:
-        """(n,) mm. Where a length is not known and does not matter to the error, any will do."""
+        """(n,) tool lengths, mm; 0 for an unknown length on which no error depends."""
         lengths = self.moves.tool_length
         if self.machine.depends_on_tool_length:
             return lengths
         return np.where(np.isnan(lengths) & ~self.moves.tcp, 0.0, lengths)
 
-    # -- the rest of the state ----------------------------------------------------------------------------------------
+    # -- direction of motion, and state -------------------------------------------------------------------------------
 
     @property
     def came(self) -> Signs | None:
-        """The direction in which each axis comes to the start of each motion, (n, n_axes); None as of `arrival`."""
+        """(n, n_axes) direction in which each axis comes to the start of each motion; None as in `arrival`."""
         return None if self._directions is None else self._directions[0]
 
     @property
     def arrival(self) -> Signs | None:
-        """The direction in which each axis ends each motion, (n, n_axes); None if no error depends on it."""
+        """(n, n_axes) direction in which each axis ends each motion; None if no error depends on it."""
         return None if self._directions is None else self._directions[1]
 
     @cached_property
     def _directions(self) -> tuple[Signs, Signs] | None:
-        """The directions at the starts of motions and at their ends; None if no error depends on them."""
+        """(n, n_axes) the directions at the starts, and at the ends, of motions; None if no error depends on them."""
         if not matters(self.machine):
             return None
         lost = ~np.isfinite(self.moves.end - self.moves.start)
@@ -213,11 +212,11 @@ class Intent:
         came = np.broadcast_to(np.asarray(self.state.direction, dtype=np.int8), ways.shape[1:])
         steps = np.stack((ways, between), axis=1).reshape(-1, ways.shape[1])
         unknown = np.stack((lost, np.zeros_like(lost)), axis=1).reshape(steps.shape)
-        found = carried(np.vstack((came[None], steps)), np.vstack((np.zeros_like(lost[:1]), unknown)))
-        return found[:-1:2], found[1::2]
+        directions = carried(np.vstack((came[None], steps)), np.vstack((np.zeros_like(lost[:1]), unknown)))
+        return directions[:-1:2], directions[1::2]
 
     def _drilling(self, holes: Index) -> tuple[Signs, Signs]:
-        """Which way axes go into holes (k,), and out of them again, (k, n_axes); 0 where that is not known."""
+        """(k, n_axes) direction of axes into holes (k,), and out of them again; 0 if not known."""
         moves, start, end = self.moves, *self.ends
         after = np.minimum(holes + 1, len(moves) - 1)
         same = (moves.tcp[after] == moves.tcp[holes]) & (moves.length_under_tcp[after] == moves.length_under_tcp[holes])
@@ -228,9 +227,9 @@ class Intent:
         return np.where(np.isfinite(level), signs(end[holes] - level), -back).astype(np.int8), back
 
     def heading(self, rows: Index, fraction: Array) -> Signs:
-        """Which way axes of curved motions go at fractions (k,), (k, n_axes); at a turning point as before it.
+        """(k, n_axes) direction of axes at fractions (k,) of curved motions; at a turning point, that before it.
 
-        0 where an axis has not moved for a thousandth of the motion.
+        0 if an axis has not moved for a thousandth of the motion.
         """
         after = self.joints_at(rows, np.minimum(fraction + INSTANT / 2, 1.0))
         now = signs(after - self.joints_at(rows, np.maximum(fraction - INSTANT / 2, 0.0)), NOISE)
@@ -238,7 +237,7 @@ class Intent:
         return np.where(now != 0, now, lately)
 
     def direction(self, rows: Index, fraction: Array) -> Signs:
-        """The direction of each axis at fractions of motions, (k, n_axes); zeros (n_axes,) if it does not matter."""
+        """(k, n_axes) direction of each axis at fractions of motions; zeros (n_axes,) if no error depends on it."""
         if self._directions is None:
             return np.zeros(len(self.machine.axes), dtype=np.int8)
         came, arrival = self._directions
@@ -254,25 +253,26 @@ class Intent:
         inputs = rows_of(State(inputs=self.state.inputs), rows).inputs
         return State(self.lengths(rows), self.direction(rows, fraction), inputs)
 
-    # -- a real machine -----------------------------------------------------------------------------------------------
+    # -- the real machine ---------------------------------------------------------------------------------------------
 
     def gap(self, rows: Index, fraction: Array, commands: Array) -> Array:
-        """Actual tip of the real machine under `commands` minus intended tip at the fractions, (k, 3) mm."""
+        """(k, 3) actual tip of the real machine under `commands` minus intended tip at the fractions, mm."""
         q, programmed = self.joints(rows, commands), self.segments.at(rows, fraction)
         return self.gaps(rows, programmed, [q], self.states(rows, fraction))[0]
 
     def gaps(self, rows: Index, programmed: Array, done: Sequence[Array], states: State) -> list[Array]:
-        """Actual tip with the axes at each of `done` minus intended tip under commands `programmed`, (k, 3) mm.
+        """For each of `done`: (k, 3) actual tip with the axes there minus intended tip, mm.
 
-        All (k, n_axes), of motions `rows` (k,).
+        programmed  (k, n_axes) programmed commands of motions `rows` (k,), for the intended tip
+        done        (k, n_axes) axis positions each
         """
         tip = self.meant(rows, programmed) if self.moves.tcp[rows].any() else None
         return self.machine.gaps(programmed, done, states, tip)
 
     def follows(self, rows: Index, commands: Array) -> Array:
-        """How the tip follows X Y Z of commands (k, n_axes) of motions `rows`: (k or 1, 3, 3) mm per mm.
+        """(k or 1, 3, 3) derivative of the tip by X Y Z of commands (k, n_axes) of motions `rows`, mm per mm.
 
-        One is for all where the rotary axes stand alike, or do not matter.
+        One matrix is valid for all if the rotary axes stand alike, or have no effect on it.
         """
         turning = commands.copy()
         turning[:, self.columns] = 0.0
@@ -281,9 +281,9 @@ class Intent:
         return regular(tip_maps(self.machine, turning[:1] if alike else turning))[0]
 
     def aimed(self, rows: Index, fraction: Array, commands: Array) -> tuple[Array, Mask]:
-        """Commands (k, n_axes) with X Y Z that bring the tip of the real machine where it should be at the fractions.
+        """Commands (k, n_axes) that bring the tip of the real machine to the intended one at the fractions (k,).
 
-        The rotary axes stay as `commands` have them. Also which of them have arrived, (k,).
+        Only X Y Z of `commands` are changed. Also (k,) whether the tip has arrived there.
         """
         moves = self.moves
         begin, target = self.joints(rows, commands), self.tip(rows, fraction)
@@ -291,14 +291,14 @@ class Intent:
         return commands_from_joints(self.machine, q, moves.tcp[rows], moves.length_under_tcp[rows]), arrived
 
     def guessed(self, real: Segments, rows: Index, fraction: Array) -> Array:
-        """Nearly the corrected commands at fractions of motions, (k, n_axes), see `improved`."""
+        """(k, n_axes) nearly corrected commands at fractions of motions, see `improved`; rotary axes as in `real`."""
         return self.improved(rows, fraction, self.segments.at(rows, fraction), real.linearly(rows, fraction))
 
     def improved(self, rows: Index, fraction: Array, programmed: Array, commands: Array) -> Array:
-        """Nearly the corrected commands, (k, n_axes), where the program has `programmed` at fractions of motions.
+        """(k, n_axes) nearly corrected commands at fractions of motions, where the program commands `programmed`.
 
-        X Y Z by one Newton step from those of the program, with the rotary axes as `commands` have them: good to the
-        errors times their gradient, some tens of nanometres. X Y Z of `commands` are overwritten.
+        X Y Z are found by one Newton step from those of the program, rotary axes are those of `commands`. The result is
+        accurate to the errors times their gradient, some tens of nanometres. X Y Z of `commands` are overwritten.
         """
         commands[:, self.columns] = programmed[:, self.columns]
         gap = self.gaps(rows, programmed, [self.joints(rows, commands)], self.states(rows, fraction))[0]
@@ -307,14 +307,14 @@ class Intent:
 
 
 SQUARE = 1 - 1e-9
-"""An axis that makes no smaller a component of a unit normal is square to its plane."""
+"""Least component of a unit normal along an axis that is square to the plane."""
 
 
 def stays(moves: Moves, unchanged: Mask, shift: Array, before: Array | None) -> Mask:
-    """(n, n_axes) axes of corrected motions that stay where they stand, and would not without this rule.
+    """(n, n_axes) idle axes of corrected motions, which stay where they stand although a correction would move them.
 
-    shift   (n, n_axes) wanted corrections
-    before  (n_axes,) how far off the axes stand at the start of the first motion
+    shift   (n, n_axes) wanted corrections, mm and rad
+    before  (n_axes,) displacement of the axes at the start of the first motion; None: zero
     """
     moving = (shift != 0).any(axis=0)
     if before is not None:
@@ -323,14 +323,14 @@ def stays(moves: Moves, unchanged: Mask, shift: Array, before: Array | None) -> 
 
 
 def left_in_cuts(moves: Moves) -> dict[str, Index]:
-    """Axis letter -> motions that cut and may be corrected, but not along that linear axis."""
+    """Letter of a linear axis -> the motions that cut and are corrected, but not along this axis (it gets no word)."""
     lacking = moves.wordless & (moves.cutting & (moves.rule == Rule.CORRECT))[:, None]
     columns = np.flatnonzero(lacking.any(axis=0) & ~moves.rotary)
     return {moves.axes[column]: np.flatnonzero(lacking[:, column]) for column in columns}
 
 
 def crooked(intent: Intent) -> Mask:
-    """(n,) arcs along an axis that must get no word: their pieces would need some."""
+    """(n,) arcs with an axis in their plane that must get no word, so that they cannot be split."""
     arcs = intent.segments.arc
     if intent.mute is None or not arcs.any():
         return np.zeros(len(arcs), dtype=bool)
@@ -339,12 +339,15 @@ def crooked(intent: Intent) -> Mask:
 
 
 def lacking(intent: Intent, rows: Index) -> Index:
-    """Places (j,) in `rows` (k,) of motions of which X, Y or Z must get no word."""
+    """(j,) the indices in `rows` (k,) of motions in which X, Y or Z must get no word."""
     return np.flatnonzero(intent.mute[rows].any(axis=1)) if intent.mute is not None else np.zeros(0, dtype=np.intp)
 
 
 def correctable(intent: Intent, rows: Index, commands: Array, gap: Array) -> Array:
-    """What of a gap (k, 3) mm between tips words could take away, where motions `rows` (k,) have `commands`."""
+    """(k, 3) the part of a gap between tips, mm, that can be corrected: without that along axes that get no word.
+
+    rows, commands  (k,) the motions, and (k, n_axes) their commands at the gap
+    """
     on = lacking(intent, rows)
     if not on.size:
         return gap

@@ -1,15 +1,15 @@
-"""Commands and axis positions: what the control makes of X Y Z, and which positions bring the tip to a point.
+"""Commands and axis positions with tool-centre-point control (TCP), and axis positions that bring the tip to a point.
 
-Without tool-centre-point control a command is the axis positions. With it, X Y Z of a command are where the tool tip
-shall be in the workpiece, in the sense that with all rotary axes at zero the program means what it means without: the
-tip goes where it would go if the linear axes had the commanded numbers, the rotary axes stood at zero and the tool had
-no length. The control then finds the linear axis positions that bring the tip there with the rotary axes at their
-commanded places. The tip moves by a linear map of X Y Z as long as nothing else moves, so three equations are solved.
-On an erroneous machine `steer` finds them by Newton's method on the exact model.
+Without TCP a command is the axis positions. With it, X Y Z of a command are the place of the tool tip in the workpiece:
+the one where the tip would be if the linear axes had the commanded values, the rotary axes stood at zero and the tool
+had no length. (So with all rotary axes at zero, X Y Z mean the same with and without TCP.) The control finds the linear
+axis positions that bring the tip there with the rotary axes at their commanded positions. While nothing else moves, the
+tip is a linear function of X Y Z, so three linear equations are solved. On an erroneous machine, `steer` finds the
+positions by Newton's method on the exact model.
 
-Directions are those of the program on a perfect machine: the sign of each axis's motion, and the last one that it had
-where it rests. The corrections themselves move axes to and fro by micrometres; an axis that rests in the program is
-taken to keep the side of its play that it last had.
+Directions of motion are those of the program on a perfect machine: the sign of each axis's motion or, for an axis at
+rest, its last direction. Corrections move axes to and fro by micrometres; an axis that rests in the program is taken to
+keep the side of its play.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ncfix.machine.steps import dot, volume
 from ncfix.values import frozen
 
 REST = 1e-9
-"""mm or rad; an axis that moves less in a motion does not move."""
+"""Motion, mm or rad, below which an axis counts as at rest."""
 
 
 def matters(machine: Machine) -> bool:
@@ -35,15 +35,15 @@ def matters(machine: Machine) -> bool:
 
 
 def signs(motion: Array, rest: float = REST) -> Signs:
-    """The direction of a motion (n, n_axes) mm and rad: -1, 1, or 0 where it is below `rest` or not known."""
+    """(n, n_axes) the direction of motions (n, n_axes), mm and rad: -1, 1, or 0 if below `rest` or not known."""
     known = np.where(np.isfinite(motion), motion, 0.0)
     return np.where(np.abs(known) < rest, 0, np.sign(known)).astype(np.int8)
 
 
 def carried(directions: Signs, lost: Mask | None = None) -> Signs:
-    """Each axis's last direction that is not 0, row after row; 0 before its first motion. Shape (n, n_axes).
+    """(n, n_axes) the last non-zero direction of each axis up to each row; 0 before its first motion.
 
-    lost  (n, n_axes) where the direction is not known any more; 0 from there on
+    lost  (n, n_axes) rows from which on a direction is not known any more: 0 until the next motion
     """
     rows, moved = np.arange(len(directions))[:, None], directions != 0
     last = np.maximum.accumulate(np.where(moved if lost is None else moved | lost, rows, 0), axis=0)
@@ -67,10 +67,10 @@ def linear_columns(machine: Machine) -> Index:
 
 
 def affine_tip(machine: Machine, q: Array, tool_length: ArrayLike = 0.0) -> tuple[Array, Array]:
-    """The tip as a function of X Y Z with everything else as in `q` (n, n_axes): tip = map @ xyz + offset.
+    """The tip as a function of X Y Z, with all other axes as in q (n, n_axes): tip = map @ xyz + offset.
 
-    Returns map (n or 1, 3, 3) [mm per mm, workpiece frame] and offset (n or 1, 3) [mm]. One row stands for all where
-    all poses agree in everything but X Y Z.
+    Returns map (n or 1, 3, 3), mm per mm, and offset (n or 1, 3), mm, in the workpiece frame. One row is valid for all
+    if all poses agree in everything but X Y Z.
     """
     columns = linear_columns(machine)
     still = q.copy()
@@ -82,12 +82,12 @@ def affine_tip(machine: Machine, q: Array, tool_length: ArrayLike = 0.0) -> tupl
 
 
 def tip_maps(machine: Machine, q: Array) -> Array:
-    """How the tip follows X Y Z at axis positions (n, n_axes): (n, 3, 3) mm per mm, workpiece frame."""
+    """(n, 3, 3) derivative of the tip by X Y Z at axis positions (n, n_axes), mm per mm, workpiece frame."""
     return machine.follows(q, tuple(linear_columns(machine).tolist()))
 
 
 def solve(maps: Array, tips: Array) -> Array:
-    """The linear motion that moves the tip by `tips` (n, 3): maps (n or 1, 3, 3) -> (n, 3) mm of X, Y, Z."""
+    """(n, 3) the motion of X, Y and Z that moves the tip by `tips` (n, 3), mm; `maps` (n or 1, 3, 3) of `tip_maps`."""
     with np.errstate(all="ignore"):
         whole, *normals = volume(*np.moveaxis(maps, 0, -1).swapaxes(0, 1))
         share = 1 / whole
@@ -95,7 +95,7 @@ def solve(maps: Array, tips: Array) -> Array:
 
 
 def regular(maps: Array) -> tuple[Array, Mask]:
-    """The maps with those that cannot be inverted replaced by the identity, and which can (n or 1,)."""
+    """The maps, with singular ones replaced by the identity, and (n or 1,) which were invertible."""
     with np.errstate(invalid="ignore"):
         fine = np.asarray(~(np.abs(volume(*np.moveaxis(maps, 0, -1).swapaxes(0, 1))[0]) < FLAT))
     usable: Array = maps if fine.all() else np.where(fine[:, None, None], maps, np.eye(3))
@@ -103,13 +103,13 @@ def regular(maps: Array) -> tuple[Array, Mask]:
 
 
 def joints_from_commands(machine: Machine, commands: Array, tcp: Mask, tool_length: ArrayLike) -> Array:
-    """The axis positions that a perfect control of this machine makes of commands.
+    """(n, n_axes) the axis positions to which the control of a perfect machine moves by these commands.
 
     commands     (n, n_axes) mm and rad
     tcp          (n,) whether X Y Z are tool-tip coordinates in the workpiece
     tool_length  (n,) or () mm, spindle reference to tip
 
-    Returns (n, n_axes). Raises `PoseError` NCF402 where the linear axes cannot bring the tip there.
+    Raises `PoseError` NCF402 if the linear axes cannot bring the tip to a point.
     """
     q, reached = reached_joints(machine, commands, tcp, tool_length)
     if not reached.all():
@@ -119,7 +119,7 @@ def joints_from_commands(machine: Machine, commands: Array, tcp: Mask, tool_leng
 
 
 def reached_joints(machine: Machine, commands: Array, tcp: Mask, tool_length: ArrayLike) -> tuple[Array, Mask]:
-    """As `joints_from_commands`, with a mask (n,) of the rows that can be reached instead of an error."""
+    """Like `joints_from_commands`, but returns a mask (n,) of the rows that can be reached instead of raising."""
     reached = np.ones(len(commands), dtype=bool)
     if not tcp.any():
         return commands, reached
@@ -139,16 +139,13 @@ def reached_joints(machine: Machine, commands: Array, tcp: Mask, tool_length: Ar
 
 
 def moves_as_one(machine: Machine) -> bool:
-    """Whether X, Y and Z reach every point wherever rotary axes are, since none of these turns some of them only."""
+    """Whether rotary axes carry all of X, Y and Z together or none, so that they reach every point in every pose."""
     ways = machine.linear_ways
     return ways is not None and not abs(volume(*ways.T)[0]) < FLAT
 
 
 def commands_from_joints(machine: Machine, q: Array, tcp: Mask, tool_length: ArrayLike) -> Array:
-    """The commands that make a perfect control take these axis positions: the inverse of `joints_from_commands`.
-
-    q, tcp and tool_length as there; returns (n, n_axes).
-    """
+    """(n, n_axes) the commands that lead to axis positions q (n, n_axes): the inverse of `joints_from_commands`."""
     if not tcp.any():
         return q
     commands, columns = q.copy(), linear_columns(machine)
@@ -167,7 +164,7 @@ def commands_from_joints(machine: Machine, q: Array, tcp: Mask, tool_length: Arr
 
 
 def programmed_tip(machine: Machine, commands: Array) -> Array:
-    """Where in the workpiece commands (n, n_axes) with tool-centre-point control want the tip, (n, 3) mm."""
+    """(n, 3) the tip in the workpiece that commands (n, n_axes) with tool-centre-point control mean, mm."""
     if moves_as_one(machine):
         return _tip_by_linear_axes(machine, commands, np.flatnonzero(~machine.rotary))
     maps, offset = affine_tip(machine, _rotary_at_zero(machine, commands))
@@ -175,7 +172,7 @@ def programmed_tip(machine: Machine, commands: Array) -> Array:
 
 
 def _tip_by_linear_axes(machine: Machine, q: Array, axes: Index) -> Array:
-    """Where some linear axes at q (n, n_axes) take the tip, the other axes at zero, (n, 3) mm; summed axis by axis."""
+    """(n, 3) the tip with linear axes `axes` at q (n, n_axes) and all other axes at zero, mm; summed axis by axis."""
     offset, ways = machine.at_zero
     tip = np.empty((3, len(q)))
     tip[:] = offset[:, None]
@@ -198,7 +195,7 @@ def _of_rows(tool_length: ArrayLike, rows: Index) -> Array:
 
 
 def common(values: Array) -> Array:
-    """One number, shape (), for values (k,) that are all the same, so that things are done once; else as they are."""
+    """One value, shape (), for values (k,) that are all equal, so that it is used once; else the values unchanged."""
     if len(values) and (values == values[0]).all():
         return np.asarray(values[0])
     return values
@@ -208,10 +205,10 @@ def common(values: Array) -> Array:
 class Correction:
     """Corrected axis positions.
 
-    q          (n, n_axes) what to command, mm and rad
+    q          (n, n_axes) the positions to command, mm and rad
     converged  (n,) the tip is where it should be, to 1 nm
     oriented   (n,) the tool orientation is corrected too, without damping or limits
-    before     (n,) mm: how far the tip is off without a correction; None if that was not looked at
+    before     (n,) tip error without a correction, mm; None if not computed
     """
 
     q: Array
@@ -221,7 +218,7 @@ class Correction:
 
 
 def rows_of(state: State, rows: Index | slice) -> State:
-    """The state of some rows; what is given for all rows together stays."""
+    """The state of rows `rows`. Values that are common to all rows are kept."""
     inputs = {name: _rows(np.asarray(values), rows, 0) for name, values in state.inputs.items()}
     length = _rows(np.asarray(state.tool_length, dtype=np.float64), rows, 0)
     return State(length, _rows(np.asarray(state.direction), rows, 1), inputs)
@@ -232,27 +229,26 @@ def _rows(values: Array, rows: Index | slice, trailing: int) -> Array:
 
 
 def moved(q: Array, columns: Index, step: Array) -> Array:
-    """Axis positions with `step` (n, 3) mm added to X Y Z."""
+    """Axis positions (n, n_axes) with `step` (n, 3), mm, added to X Y Z."""
     result = q.copy()
     result[:, columns] += step
     return result
 
 
 def steer(machine: Machine, q: Array, target: Array | None, state: State) -> tuple[Array, Mask]:
-    """Move X Y Z until the erroneous machine's tip is at `target`; None: where a perfect machine has it at q.
+    """Axis positions at which the tip of the erroneous machine is at `target`; only X Y Z are changed.
 
-    q       (n, n_axes) where to begin; only X Y Z are changed
-    target  (n, 3) tool tip in the workpiece frame, mm
+    q       (n, n_axes) positions to begin with
+    target  (n, 3) tool tip in the workpiece frame, mm; None: that of a perfect machine at q
 
-    See `Machine.aim`. Returns the positions and which of them have arrived: the gap, falling by the ratio that the last
-    two passes show, will be under 1 nm.
+    Also (n,) which have arrived, within 1 nm. See `Machine.aim`.
     """
     found = steered(machine, q, target, state)
     return found.q, found.converged
 
 
 def steered(machine: Machine, q: Array, target: Array | None, state: State) -> Correction:
-    """As `steer`; how far off the tip was tells something about the program if that is where it began."""
+    """Like `steer`, as a `Correction`: `before` is the tip error at q, that of the program if q is its pose."""
     columns = linear_columns(machine)
     x, y, z = columns.tolist()
     aim = machine.aim(q, (x, y, z), state, target)

@@ -1,4 +1,4 @@
-"""What a corrected program must not do: leave the travel, correct too much or too fast, go where nothing is known."""
+"""Limits that a corrected program must keep: travel, size and rate of corrections, range of calibration."""
 
 from __future__ import annotations
 
@@ -14,27 +14,28 @@ from ncfix.compensate.plan.written import WrittenPieces
 from ncfix.machine import Machine
 
 FUZZ = 1e-9
-"""mm or rad beyond a limit that count as on it: rounding of the arithmetic, a thousandth of any control's digit."""
+"""Distance beyond a limit, mm or rad, that still counts as on it: rounding of the arithmetic, far below any least
+increment."""
 RATE = 0.02
-"""How much a correction may change per mm of way, mm/mm: ten times what 100 um per 50 mm makes."""
+"""Largest change of a correction per way, mm/mm: ten times 100 um per 50 mm."""
 JUMP = 0.05
-"""mm that a correction may change at one place: a large play."""
+"""Largest change of a correction at one place, mm: a large play."""
 RATE_TURNING = 1.0
-"""The same per rad of a rotary axis, mm/rad: 100 um in a tenth of a radian."""
+"""Largest change of a correction per turn of a rotary axis, mm/rad: 100 um in a tenth of a radian."""
 LOOKS = 64
-"""Places at which a curved motion is looked at for where an axis turns back."""
+"""Number of stretches between samples of a curved motion, by which places are found where an axis turns back."""
 NEAR = 8
-"""An axis whose highest look is less than an eighth of its travel below a limit may pass it in between (14 turns)."""
+"""Samples closer to a limit than this part (1/8) of the way of the axis: the axis may pass it in between (14 turns)."""
 PLACES = 8
-"""Places between two that each step of the search looks at: the bracket falls to 2 parts of 9."""
+"""Number of inner points per step of the search: each step shrinks the bracket to 2/9."""
 STEPS = 16
-"""Steps of the search: where the highest place is, to 4e-11 of the bracket."""
+"""Number of steps of the search: the place of the maximum is found to 4e-11 of the bracket."""
 
 Joints = Callable[[Index, Array], Array]
 
 
 def findings(written: WrittenPieces) -> tuple[Finding, ...]:
-    """Everything that is against correcting motions as they are written; only corrected ones are looked at."""
+    """All violations of limits by corrected motions."""
     found = [not_a_number(written), *beyond_ranges(written), too_large(written), too_fast(written)]
     return tuple(finding for finding in found if len(finding))
 
@@ -49,16 +50,16 @@ def not_a_number(written: WrittenPieces) -> Finding:
 
 
 def beyond_ranges(written: WrittenPieces) -> tuple[Finding, Finding]:
-    """NCF405: motions that leave the range of an axis as programmed, or come back from beyond it in several blocks.
+    """Motions that leave the range of an axis.
 
-    NCF404: motions that stay within the range of every axis as programmed, and leave one when corrected. On the limit
-    is within. Of a motion that both leaves a range and comes back from beyond one the first is said: how many blocks it
-    has depends on what has been refused by then.
+    NCF405: as programmed, or by pieces that end beyond a range on the way back from a start beyond it. NCF404: only
+    when corrected. A position on the limit is within the range. For a motion that leaves one range and comes back from
+    beyond another, the former is reported, because it does not depend on how the motion is split.
     """
     programmed, corrected = programmed_excess(written), _corrected_excess(written)
     if (corrected > FUZZ).any():
         each = np.flatnonzero((corrected > FUZZ).any(axis=1))
-        begun = np.full(corrected.shape, -np.inf)  # how far motions begin beyond ranges, if they end there
+        begun = np.full(corrected.shape, -np.inf)  # excess at the starts of motions
         begun[each] = _beyond(written.intent.machine, written.intent.joints_at(each, np.zeros(len(each))))
         either = np.fmax(programmed, np.where(corrected > FUZZ, begun, -np.inf))
         corrected[either > FUZZ] = -np.inf
@@ -69,7 +70,7 @@ def beyond_ranges(written: WrittenPieces) -> tuple[Finding, Finding]:
 
 
 def increments_beyond_travel(written: WrittenPieces) -> Index:
-    """Increments that are left as they are, and that leave the range of an axis because of where they begin."""
+    """The unchanged incremental motions that leave the range of an axis because their start is displaced."""
     pieces = written.pieces
     rows = np.flatnonzero(written.intent.moves.incremental & pieces.unchanged[pieces.first])
     if not rows.size:
@@ -81,7 +82,7 @@ def increments_beyond_travel(written: WrittenPieces) -> Index:
 
 
 def _corrected_excess(written: WrittenPieces) -> Array:
-    """As `excess`, of the corrected program, (n, n_axes)."""
+    """(n, n_axes) `excess` of the corrected motions: the largest of their pieces."""
     pieces = written.pieces
     each = np.arange(len(pieces))
     tcp = written.intent.moves.tcp[pieces.move]
@@ -98,7 +99,7 @@ def _corrected_excess(written: WrittenPieces) -> Array:
 
 
 def too_large(written: WrittenPieces) -> Finding:
-    """NCF406: corrections above the machine's `max_correction`: the linear axes together, each rotary axis alone."""
+    """NCF406: corrections above the machine's `max_correction`: norm of the linear axes, and each rotary axis."""
     machine = written.intent.machine
     shift = written.correction
     linear = lengths(shift[:, ~machine.rotary]) / machine.max_correction[0]
@@ -111,7 +112,7 @@ def too_large(written: WrittenPieces) -> Finding:
 
 
 def too_fast(written: WrittenPieces) -> Finding:
-    """NCF407: corrections of the linear axes that change by more than the way in between accounts for."""
+    """NCF407: corrections of the linear axes that change by more than `JUMP` plus what the rates allow."""
     machine, pieces = written.intent.machine, written.pieces
     change = np.diff(written.correction[:, ~machine.rotary], axis=0)
     if written.intent.wordless is not None:
@@ -126,12 +127,12 @@ def too_fast(written: WrittenPieces) -> Finding:
 
 
 def excess(machine: Machine, joints: Joints, motion: Index, curved: Mask, ends: Array | None = None) -> Array:
-    """How far axes go beyond their ranges along motions, (k, n_axes) mm and rad; negative while within.
+    """(k, n_axes) how far axes go beyond their ranges along motions, mm and rad; negative within.
 
-    joints  gives axis positions (j, n_axes) at fractions (j,) of motions (j,)
-    motion  (k,) which motions
-    curved  (k,) axes do not move linearly along it: looked at inside too, not only at the end
-    ends    (k, n_axes) axis positions where they end, if known
+    joints  returns axis positions (j, n_axes) at fractions (j,) of motions (j,)
+    motion  (k,) the motions
+    curved  (k,) axes do not move linearly along the motion: it is sampled inside too, not only at its end
+    ends    (k, n_axes) axis positions at the ends of the motions, if known
     """
     result = _beyond(machine, joints(motion, np.ones(len(motion))) if ends is None else ends)
     rows = np.flatnonzero(curved)
@@ -157,9 +158,9 @@ def excess(machine: Machine, joints: Joints, motion: Index, curved: Mask, ends: 
 
 
 def _highest(function: Callable[[Index, Array], Array], low: Array, high: Array) -> Array:
-    """The largest value of functions with one maximum between `low` and `high` (k,); where it is negative, a lower one.
+    """(k,) maximum of k functions, each with one maximum between `low` and `high` (k,); a negative one may be too low.
 
-    function  gives the values of functions (j,) at places (j,): many at a time, since few calls are what counts here
+    function  returns the values of functions (j,) at places (j,); many at a time, so that it is called seldom
     """
     highest, searched = np.full(len(low), -np.inf), np.arange(len(low))
     inner = np.arange(1, PLACES + 1)
@@ -180,7 +181,7 @@ def _highest(function: Callable[[Index, Array], Array], low: Array, high: Array)
 
 
 def _beyond(machine: Machine, q: Array) -> Array:
-    """How far beyond the nearer end of its range each axis is, negative if within; -inf where there is no range."""
+    """(k, n_axes) how far each axis is beyond the nearer end of its range; negative within, -inf without a range."""
     result = np.empty_like(q)
     for axis, (low, high) in enumerate(machine.ranges.tolist()):
         np.maximum(low - q[:, axis], q[:, axis] - high, out=result[:, axis])
@@ -188,7 +189,7 @@ def _beyond(machine: Machine, q: Array) -> Array:
 
 
 def programmed_excess(written: WrittenPieces) -> Array:
-    """As `excess`, of the program as it is; (n, n_axes)."""
+    """(n, n_axes) `excess` of the programmed motions."""
     intent = written.intent
     each = np.arange(len(intent.moves))
     ends = written.programmed if len(each) == len(written.pieces) else None
@@ -203,19 +204,16 @@ def programmed_excess(written: WrittenPieces) -> Array:
 
 
 def _may_leave(intent: Intent, begin: Array, end: Array) -> Mask:
-    """(k,) which motions under tool-centre-point control may leave a range on their way; see `excess`.
+    """(k,) motions under tool-centre-point control that may leave a range between their ends.
 
-    begin, end  (k, n_axes) axis positions
+    begin, end  (k, n_axes) axis positions at their ends
     """
     longest = float(np.nanmax(intent.moves.tool_length, initial=0.0))
     return ~surely_within(intent.machine, begin, end, longest)
 
 
 def _arcs_may_leave(machine: Machine, segments: Segments, tcp: Mask) -> Mask:
-    """(n,) which motions are arcs that may leave a range on their way; see `excess`.
-
-    tcp  (n,) under tool-centre-point control: these may
-    """
+    """(n,) arcs that may leave a range between their ends; `tcp` (n,): under tool-centre-point control, all may."""
     may_leave = segments.arc.copy()
     rows = np.flatnonzero(may_leave & ~tcp)
     may_leave[rows] = ~arcs_within(machine, segments.rows(rows))
@@ -223,7 +221,7 @@ def _arcs_may_leave(machine: Machine, segments: Segments, tcp: Mask) -> Mask:
 
 
 def _of_axes(written: WrittenPieces, code: str, text: str, beyond: Array) -> Finding:
-    """A finding for each corrected motion with an axis beyond its range; values in mm or degrees."""
+    """The finding of all corrected motions with an axis beyond its range; `beyond` (n, n_axes), see `excess`."""
     machine, pieces = written.intent.machine, written.pieces
     if not (beyond > FUZZ).any():
         return Finding.of(code, np.zeros(0, dtype=np.intp), text)
@@ -241,7 +239,7 @@ def _of_axes(written: WrittenPieces, code: str, text: str, beyond: Array) -> Fin
 
 
 def _worst(moves: Index, values: Array) -> tuple[Index, Array]:
-    """Each motion once, with its largest value."""
+    """The distinct motions, and the largest value of each."""
     rows = distinct(moves)
     most = np.zeros(len(rows))
     np.maximum.at(most, np.searchsorted(rows, moves), values)

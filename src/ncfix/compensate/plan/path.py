@@ -1,11 +1,11 @@
-"""The plan of a corrected program: which commands to write so that the whole path stays within the tolerance.
+"""The plan of a corrected program: the commands to write so that the whole path stays within the tolerance.
 
-Ends of motions are corrected first. Then every motion is judged along its path: the real machine following the
-corrected piece, straight or arc, against the intended path at the same fraction. Most motions pass after one look or
-two; an arc that does not is made of straight pieces, and what needs it is split at the fewest places.
+The ends of motions are corrected first. Then every motion is judged along its path: the tip of the real machine on the
+corrected motion, straight or arc, is compared with the intended path at the same fraction. Most motions are within the
+tolerance. Those that are not are split at the fewest places, arcs into arcs or straight pieces.
 
-Rapids are corrected at their ends. How a control goes from one end to the other in a rapid is its own affair, so they
-are split only if asked. Canned cycles are corrected at their end. Nothing is split under cutter radius compensation.
+Rapids are corrected at their ends, and split only on request, because controls differ in how they go from end to end.
+Canned cycles are corrected at their end. Nothing is split under cutter radius compensation.
 """
 
 from __future__ import annotations
@@ -53,20 +53,20 @@ from ncfix.values import frozen
 from ncfix.writer.pieces import Pieces
 
 LEAST_SHARE = 1e-6
-"""Of a motion's time, for a piece that goes nowhere: inverse-time feed is divided by it."""
+"""Least share of a motion's time for a piece that only takes up a jump: inverse-time feed is divided by it."""
 
 
 @frozen
 class Plan:
-    """What to write, and what there is to say about it.
+    """The pieces to write, and the findings about the motions.
 
-    pieces     the corrected path, one row or more per motion
-    start      (n, n_axes) the command at which each motion really starts, NaN where not known
-    deviation  (n,) mm: how far the tip was found to leave the intended path, before rounding; 0 where not looked at
+    pieces     the corrected path, one row or more per motion; `pieces.unchanged`: motions left as they were
+    start      (n, n_axes) the command at which each motion really starts, NaN if not known
+    deviation  (n,) largest deviation of the tip from the intended path, mm, before rounding; 0 if not examined
     oriented   (n,) the tool direction is corrected too, without damping or limits
-    findings   what is wrong, by motion; `pieces.unchanged` tells what was left as it was
-    known      what is known of the ends of motions
-    corners    what rounding may do at corners that the control offsets, in half output steps; 0 where there are none
+    findings   problems and remarks, by motion
+    known      tip errors known from the correction of the ends
+    corners    effect of rounding at corners that the control offsets, in half output steps; 0 without such corners
     """
 
     pieces: Pieces
@@ -97,7 +97,7 @@ def assembled(
     oriented: Mask,
     findings: tuple[Finding, ...],
 ) -> Plan:
-    """The plan of motions done as `real` has them, but for motions `rows`, which are done in `parts`."""
+    """The plan in which each motion is one piece as in `real`, but motions `rows` (k,) are split into `parts`."""
     counts = np.ones(len(moves), dtype=np.intp)
     if parts is not None:
         counts[rows] = parts.counts
@@ -114,7 +114,7 @@ def assembled(
 
 
 def _shares(pieces: Pieces, real: Segments, counts: Index) -> Array:
-    """Shares of time: those of the fraction; a piece that only takes up a jump has the share of its way."""
+    """(m,) share of each piece in the time of its motion: its fraction, or its share of the way at a jump."""
     span = pieces.fraction - pieces.begun
     jumps = span < 2 * INSTANT
     if not jumps.any():
@@ -136,10 +136,10 @@ less than 1 - cos(pi / 32) = 0.5 % of its height, and a parabola's over its chor
 
 @frozen
 class PathTolerance:
-    """A path tolerance, and what rounding does besides.
+    """A path tolerance, and the effect of rounding, which comes on top of it.
 
-    tolerance  what was asked of the path before rounding, mm
-    rounding   how far the tip may be off because commands are rounded: the norm of half output steps, mm
+    tolerance  tolerance of the path before rounding, mm
+    rounding   largest shift of the tip because commands are rounded: the norm of half output steps, mm
     """
 
     tolerance: float
@@ -147,23 +147,23 @@ class PathTolerance:
 
     @property
     def path(self) -> float:
-        """What the path between emitted points may use."""
+        """Tolerance at the sample points, mm: the tolerance without the share held back for what lies between them."""
         return (1 - SAMPLED) * self.tolerance
 
     @property
     def fine(self) -> bool:
-        """Whether the control's digits are fine enough for such a tolerance."""
+        """Whether rounding to the control's digits uses at most half of the tolerance."""
         return self.rounding <= self.tolerance / 2
 
 
 @frozen
 class Requirements:
-    """What the corrected program has to meet.
+    """The requirements on the corrected program.
 
-    budget        the tolerance, and what rounding does besides
-    closure       what the control accepts as an arc
+    budget        the tolerance, and the effect of rounding
+    closure       the arcs that the control accepts
     split_rapids  the tolerance holds along rapids too
-    arc_pieces    an arc may be made of several arcs
+    arc_pieces    an arc may be split into several arcs
     """
 
     budget: PathTolerance
@@ -177,8 +177,8 @@ def plan(
 ) -> Plan:
     """Correct the motions of a program.
 
-    keep    (n,) motions to leave as they are, besides those that the tracer does not allow to correct
-    before  (n_axes,) how far off the axes stand at the start of the first motion, mm and rad; not if not given
+    keep    (n,) motions to leave unchanged, besides those that must not be corrected by their rule
+    before  (n_axes,) displacement of the axes at the start of the first motion, mm and rad; None: zero
 
     Motions that cannot be corrected stay unchanged and are named in the findings. Raises `RefusedError` NCF401 if the
     machine has no X, Y and Z.
@@ -193,7 +193,7 @@ def plan(
 
 
 def _behind(machine: Machine, as_it_is: Plan, moves: Moves, before: Array) -> Plan:
-    """A plan that changes nothing, behind motions that have left the axes so far off, (n_axes,) mm and rad."""
+    """A plan that changes nothing, with the displacement `before` (n_axes,), mm and rad, at its start."""
     unchanged = as_it_is.pieces.unchanged
     where = standing(machine, moves, moves.end, unchanged, before)
     return replace(as_it_is, start=where.start, pieces=replace(as_it_is.pieces, end=where.end))
@@ -209,7 +209,7 @@ def _plan(intent: Intent, strategy: Strategy, required: Requirements, unchanged:
     bound = intent.moves.compensated | crooked(intent) if strategy.follows_path else np.ones(len(unchanged), dtype=bool)
 
     def without(finding: Finding) -> Plan:
-        """The plan in which the motions of a finding stay unchanged, too."""
+        """The plan in which the motions of a finding stay unchanged, too, with that finding."""
         also = unchanged.copy()
         also[finding.moves] = True
         planned = _plan(intent, strategy, required, also, before)
@@ -243,9 +243,10 @@ def _plan(intent: Intent, strategy: Strategy, required: Requirements, unchanged:
 
 
 def _worse_contours(intent: Intent, beside: OffsetPoints | None, unchanged: Mask, required: Requirements) -> Finding:
-    """NCF454: contours (k,) with a corner that the control would make worse of what is corrected than it is without.
+    """NCF454: contours with a corner at which the tool would be farther off with the correction than without it.
 
-    Worse is what is beyond the tolerance, and more than before and what the control's digits do there.
+    That is, beyond the tolerance, and by more than before plus the effect of rounding. All corrected motions of such a
+    contour are in the finding.
     """
     text = "beside this contour the control would take the tool up to {value:.1f} um off, farther than uncorrected"
     none = Finding.of("NCF454", np.zeros(0, dtype=np.intp), text)
@@ -271,7 +272,7 @@ def _real(
     before: Array | None,
     approaches: Array | None,
 ) -> tuple[Segments, Mask]:
-    """What the control would be told without splitting, and the arcs (n,) that cannot stay arcs."""
+    """The corrected motions before any splitting, and (n,) the arcs that cannot stay arcs."""
     moves, programmed = intent.moves, intent.segments
     wanted = with_closed_circles(intent, wanted, unchanged, required.budget.path / 2, before, approaches)
     where = standing(intent.machine, moves, wanted, unchanged, before, approaches)
@@ -288,7 +289,7 @@ def _real(
 
 
 def _followed(intent: Intent, real: Segments, unchanged: Mask, strategy: Strategy, required: Requirements) -> Mask:
-    """(n,) motions that are looked at along their way."""
+    """(n,) motions that are examined along their way, not only at their end."""
     if not strategy.follows_path:
         return np.zeros(len(unchanged), dtype=bool)
     kind = intent.moves.kind
@@ -301,7 +302,7 @@ def _followed(intent: Intent, real: Segments, unchanged: Mask, strategy: Strateg
 def _judged(
     intent: Intent, real: Segments, unchanged: Mask, broken: Mask, followed: Mask, required: Requirements
 ) -> Array:
-    """How far the tip leaves the intended path along each motion, (n,) mm; 0 where it is not looked at."""
+    """(n,) largest deviation of the tip from the intended path along each motion, mm; 0 if not examined."""
     deviation = np.zeros(len(unchanged))
     rows = np.flatnonzero(followed & ~broken)
     deviation[rows] = deviations(intent, real, rows, starts_to_check(intent, unchanged), required.budget.path)
@@ -312,7 +313,7 @@ def _judged(
 def in_pieces(
     intent: Intent, real: Segments, rows: Index, deviation: Array, strategy: Strategy, required: Requirements
 ) -> Split:
-    """Motions `rows` in pieces: of arcs in arcs, where the control and the tolerance allow, else in straight ones."""
+    """Motions `rows` (k,) split: arcs into arcs if control and tolerance allow it, all others into straight pieces."""
     limit = required.budget.path
     round_ = np.zeros(len(rows), dtype=bool)
     if required.arc_pieces:
@@ -331,12 +332,12 @@ def in_pieces(
 
 
 def _bows(deviation: Array, tolerance: float) -> Array:
-    """About how many pieces motions will need that deviate so much: one per bow."""
+    """(k,) about how many pieces motions with these deviations (k,), mm, will need: one per bow."""
     return np.sqrt(np.where(np.isfinite(deviation), deviation, 0.0) / tolerance) + 1
 
 
 def _pieces(intent: Intent, real: Segments, rows: Index, deviation: Array, tolerance: float) -> Array:
-    """About how many straight pieces motions will need: one per bow of the deviation, and those of the arc itself."""
+    """(k,) about how many straight pieces motions will need: one per bow of the deviation, and the chords of an arc."""
     moves = intent.moves
     count = _bows(deviation, tolerance)
     arcs = np.flatnonzero(intent.segments.arc[rows])
@@ -350,14 +351,14 @@ def _pieces(intent: Intent, real: Segments, rows: Index, deviation: Array, toler
 
 
 def _not_far_off(intent: Intent, rows: Index) -> Index:
-    """Motions `rows` (k,) without those that end farther beyond a range than it is wide: for that they are refused."""
+    """Motions `rows` (k,) without those that end farther beyond a range than it is wide; those are refused anyway."""
     low, high = intent.machine.ranges.T
     q = intent.joints_at(rows, np.ones(len(rows)))
     return rows[every((q > 2 * low - high) & (q < 2 * high - low))]
 
 
 def not_split(rows: Index, deviation: Array) -> Finding:
-    """NCF413: motions (k,) that would have to be split, and must not be; `deviation` in mm."""
+    """NCF413: motions (k,) that would have to be split but must not be; `deviation` (k,) mm."""
     text = "the tool tip leaves the intended path by {value:.1f} um, and this motion must not be split"
     return Finding("NCF413", rows, deviation * 1e3, text)
 
@@ -365,7 +366,7 @@ def not_split(rows: Index, deviation: Array) -> Finding:
 def _remarks(
     intent: Intent, deviation: Array, oriented: Mask, unchanged: Mask, strategy: Strategy, required: Requirements
 ) -> list[Finding]:
-    """What is not as it was asked for, though no motion stays unchanged for it."""
+    """Remarks: shortfalls of the plan for which no motion stays unchanged."""
     remarks = []
     budget = required.budget
     over = np.flatnonzero((deviation > budget.path) & (intent.moves.compensated | crooked(intent)))
@@ -390,7 +391,7 @@ def _remarks(
 
 
 def _unknown_radius(intent: Intent, unchanged: Mask) -> Index:
-    """The first corrected motions of contours beside which the tool goes by a radius that is not known."""
+    """The first corrected motion of each stretch of a contour that the control offsets by an unknown tool radius."""
     beside = intent.moves.beside
     if beside is None:
         return np.zeros(0, dtype=np.intp)

@@ -1,4 +1,4 @@
-"""Where a motion must be looked at: as densely as the error model may bend, and at its kinks and jumps."""
+"""Sample points along motions: as dense as the bends of the error model require, and at its kinks and jumps."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ from ncfix.compensate.plan.segments import Segments, accelerations
 from ncfix.machine import Machine
 
 DENSITY = 4
-"""Samples per shortest distance over which the error model bends."""
+"""Number of samples per shortest distance over which the error model bends."""
 TURN = 2 * np.pi
 EIGHTH = TURN / 8
-"""rad; whatever the errors do, turning an axis bends their effect in the workpiece over an eighth of a turn."""
+"""Feature length, rad, of any rotary axis: its turn bends the effect of errors in the workpiece over this angle."""
 MOST = 1 << 19
-"""Samples on one motion, so many that they take a second or two."""
+"""Largest number of samples on one motion; so many take a second or two."""
 MOST_SHOWN = 1 << 14
-"""Samples on one motion for figures: of all motions of a program at once, and of programs that nobody checked."""
+"""Largest number of samples on one motion for figures, which are taken of all motions of a program."""
 MOST_TURNS = MOST / DENSITY * EIGHTH
-"""rad; a motion that turns an axis by more cannot be looked at."""
+"""Largest turn, rad, of an axis in a motion that can be sampled."""
 SHARES = 16
-"""Of a motion that turns far, looked at each by itself."""
+"""Number of shares of a motion that turns far, whose bends are counted separately."""
 BISECTIONS = 40
-"""How often the stretch in which an axis turns round is halved to find where."""
+"""Number of bisections by which the place is found at which an axis reverses."""
 
 
 def features(machine: Machine) -> Array:
-    """The way of each axis (n_axes,) over which the tip's error in the workpiece may bend, mm and rad."""
+    """(n_axes,) shortest way of each axis over which the tip error in the workpiece may bend, mm and rad."""
     return np.where(machine.rotary, np.minimum(machine.feature_lengths, EIGHTH), machine.feature_lengths)
 
 
 def bends(intent: Intent, rows: Index) -> Array:
-    """About how many times the error may bend along each motion, (k,).
+    """(k,) about how many times the error may bend along each motion: the ways of all axes over their `features`.
 
-    The ways of all axes, each in the lengths over which it bends the error, added up. Without tool-centre-point
-    control the ways are those of the commands, on arcs those of the full arc. With it the linear axes also make the way
-    of swinging the tip round: up to the distance of the tip from the rotary axes times the angle.
+    Without tool-centre-point control the ways are those of the commands; on arcs, those along the arc. With it, the
+    linear axes also make the way of swinging the tip: up to the distance of the tip from the rotary axes times the
+    angle.
     """
     moves, machine = intent.moves, intent.machine
     way = np.abs(picked(moves.end, rows) - picked(moves.start, rows))
@@ -57,10 +57,11 @@ def bends(intent: Intent, rows: Index) -> Array:
 
 
 def bends_closely(intent: Intent, rows: Index) -> Array:
-    """As `bends`, but under tool-centre-point control by what the linear axes have to go, and not by what they might.
+    """Like `bends`, but closer under tool-centre-point control, where it uses the real ways of the linear axes.
 
-    An axis whose acceleration is at most a, per motion squared, goes up and down by no more than a / 3 beside its way;
-    of a k-th of the motion a is a k-th of a k-th. Motions that turn far are looked at in `SHARES` shares.
+    An axis whose acceleration is at most a, mm per motion squared, goes to and fro by at most a / 3 beside the way from
+    its start to its end. In one of k shares of the motion, a is smaller by k^2. Motions that turn far are taken in
+    `SHARES` shares.
     """
     often, machine = bends(intent, rows), intent.machine
     tcp = np.flatnonzero(intent.moves.tcp[rows] & ~intent.segments.arc[rows])
@@ -84,12 +85,12 @@ def bends_closely(intent: Intent, rows: Index) -> Array:
 
 
 def too_long(intent: Intent, rows: Index) -> Mask:
-    """Motions (k,) on which the error may bend so often that they are not looked at closely enough."""
+    """(k,) motions along which the error may bend too often for `MOST` samples."""
     return DENSITY * bends(intent, rows) >= MOST
 
 
 def reach(intent: Intent, rows: Index) -> Array:
-    """The distance of the tip from the rotary axes at the ends of motions, roughly and from above, (k,) mm."""
+    """(k,) a rough upper bound of the distance of the tip from the rotary axes at the ends of motions, mm."""
     machine, moves = intent.machine, intent.moves
     points = [float(np.linalg.norm(axis.point)) for axis in machine.axes if axis.rotary]
     fixed = max(points, default=0.0) + float(np.linalg.norm(machine.workpiece_offset))
@@ -98,31 +99,33 @@ def reach(intent: Intent, rows: Index) -> Array:
 
 
 def arc_radii(intent: Intent, rows: Index) -> Array:
-    """The radii of arcs where they start, (k,) mm."""
+    """(k,) the radii of arcs at their starts, mm."""
     start = intent.segments.start[rows[:, None], intent.columns] - intent.moves.centre[rows]
     return np.linalg.norm(vector_product(intent.moves.normal[rows], start), axis=1)
 
 
 def even(counts: Index) -> Array:
-    """Fractions that divide motions evenly, ends left out: `counts` (n,) of them each, flat."""
+    """Fractions that divide each motion evenly, without its ends: `counts` (n,) for each, flat."""
     return (places(counts) + 1) / np.repeat(counts + 1, counts)
 
 
 def interior(
     intent: Intent, real: Segments, rows: Index, per_bend: float, least: int, often: Array | None = None
 ) -> tuple[Index, Array]:
-    """Fractions at which to look at motions, ends left out: counts (k,) and flat fractions, ascending.
+    """The sample points inside motions `rows` (k,): counts (k,) and flat fractions, ascending, without the ends.
 
-    `per_bend` samples for each time that the error may bend, from `least` to `MOST`, and one wherever an axis passes a
-    kink or a jump of the error model, done as `real` has the motions. Those that are too long get the least. `often`:
-    how many times it may bend, (k,), if that is known better than `bends` has it.
+    real      the motions as done: an axis that passes a kink or jump of the error model in them gets a sample there
+    per_bend  samples for each time that the error may bend, at least `least`, at most `MOST`
+    often     (k,) how many times the error may bend; None: by `bends`
+
+    A motion along which the error may bend too often for `MOST` samples gets `least`.
     """
     counts = closely(bends(intent, rows) if often is None else often, per_bend, least)
     return with_kinks(intent, real, rows, counts, even(counts))
 
 
 def closely(often: Array, per_bend: float, least: int, most: int = MOST) -> Index:
-    """At how many places inside of motions to look, along which the error may bend so often, (k,): see `interior`."""
+    """(k,) number of samples inside motions along which the error may bend `often` (k,) times, see `interior`."""
     often = np.where(DENSITY * often >= MOST, 0.0, often)
     return np.clip(np.ceil(per_bend * often), least, most).astype(np.intp)
 
@@ -130,23 +133,24 @@ def closely(often: Array, per_bend: float, least: int, most: int = MOST) -> Inde
 def with_kinks(
     intent: Intent, real: Segments, rows: Index, counts: Index, fraction: Array, beside: float = 0.0
 ) -> tuple[Index, Array]:
-    """Fractions of motions, ends left out, and those at which an axis passes a kink or a jump of the error model.
+    """Sample points with those added at which an axis passes a kink or a jump of the error model.
 
-    counts (k,) and flat `fraction`, ascending; `beside`: not there, but so far before and behind it.
+    counts    (k,) number of sample points of each motion, and their flat `fraction`, ascending, without the ends
+    beside    if not 0: fraction before and behind a kink or jump at which points are added, instead of one at it
     """
     if not intent.kinks:
         return counts, fraction
     owner, at = _nodes(intent.curved[rows], counts, fraction)
     q = intent.joints(rows[owner], real.at(rows[owner], at))
-    where, found = crossed(intent, owner, at, q)
+    where, kink = crossed(intent, owner, at, q)
     if not where.size:
         return counts, fraction
-    sides = [(where, found)] if not beside else [(where, np.clip(found + way, 0.0, 1.0)) for way in (-beside, beside)]
+    sides = [(where, kink)] if not beside else [(where, np.clip(kink + way, 0.0, 1.0)) for way in (-beside, beside)]
     return merged(len(rows), (owners(counts), fraction), *sides)
 
 
 def merged(n: int, *lists: tuple[Index, Array]) -> tuple[Index, Array]:
-    """Several flat lists of (owner, fraction) as one with counts (n,), ascending within each owner, none twice."""
+    """Several flat lists of (owner, fraction) as one: counts (n,) and fractions, ascending per owner, none twice."""
     owner = np.concatenate([each[0] for each in lists])
     fraction = np.concatenate([each[1] for each in lists])
     order = np.lexsort((fraction, owner))
@@ -157,7 +161,7 @@ def merged(n: int, *lists: tuple[Index, Array]) -> tuple[Index, Array]:
 
 
 def passed(intent: Intent, before: Array, after: Array) -> tuple[Index, Array]:
-    """Where axes going from `before` to `after` (k, n_axes) pass a kink or a jump: which motion, share of its way."""
+    """Where axes going from `before` to `after` (k, n_axes) pass a kink or jump: motion and share of its way, flat."""
     found = [(np.zeros(0, dtype=np.intp), np.zeros(0))]
     for j, points in intent.kinks:
         begin, end = before[:, j], after[:, j]
@@ -168,9 +172,9 @@ def passed(intent: Intent, before: Array, after: Array) -> tuple[Index, Array]:
 
 
 def crossed(intent: Intent, owner: Index, fraction: Array, q: Array) -> tuple[Index, Array]:
-    """Where axes pass a kink or a jump on motions given by axis positions q (k, n_axes) at nodes, flat.
+    """Where axes pass a kink or a jump, on motions given by axis positions q (k, n_axes) at nodes: owner, fraction.
 
-    Axes move nearly linearly from node to node. Returns owner and fraction, flat.
+    The axes are taken to move linearly from node to node. `owner`, `fraction` (k,): motion and place of each node.
     """
     stretch, share = passed(intent, q[:-1], q[1:])
     inside = owner[stretch] == owner[stretch + 1]
@@ -179,7 +183,7 @@ def crossed(intent: Intent, owner: Index, fraction: Array, q: Array) -> tuple[In
 
 
 def _nodes(curved: Mask, counts: Index, fraction: Array) -> tuple[Index, Array]:
-    """Samples and both ends of curved motions, the ends only of others: owner and fraction, flat."""
+    """The sample points and both ends of curved motions, only the ends of others: owner and fraction, flat."""
     many = np.where(curved, counts, 0) + 2
     owner, last = owners(many), offsets(many)[1:] - 1
     at, inside = np.zeros(len(owner)), np.ones(len(owner), dtype=bool)
@@ -189,9 +193,9 @@ def _nodes(curved: Mask, counts: Index, fraction: Array) -> tuple[Index, Array]:
 
 
 def _unrolled(before: Array, after: Array, points: Array) -> tuple[Array, Array, Array]:
-    """Ways (k,) of an endless axis, without the turns that lie behind both ends, and the kinks on them.
+    """The ends of ways (k,) of an endless axis, with common full turns taken off, and the kinks on these ways.
 
-    Kinks come again with every turn. Of a motion with more than `MOST_TURNS` only the beginning is looked at.
+    Kinks repeat with every turn. A way longer than `MOST_TURNS` is cut off there.
     """
     after = before + np.clip(after - before, -MOST_TURNS, MOST_TURNS)
     behind = TURN * np.floor(np.minimum(before, after) / TURN)
@@ -203,7 +207,7 @@ def _unrolled(before: Array, after: Array, points: Array) -> tuple[Array, Array,
 
 
 def _crossings(before: Array, after: Array, points: Array) -> tuple[Index, Array]:
-    """Where values that go from `before` to `after` (k,) pass `points`: index and share of the way, ends left out."""
+    """Where values going from `before` to `after` (k,) pass `points`: index and share of the way, without the ends."""
     low, high = np.minimum(before, after), np.maximum(before, after)
     first = np.searchsorted(points, low, side="right")
     counts = np.maximum(np.searchsorted(points, high, side="left") - first, 0)
@@ -214,7 +218,10 @@ def _crossings(before: Array, after: Array, points: Array) -> tuple[Index, Array
 
 
 def reversals(intent: Intent, rows: Index, counts: Index, fraction: Array) -> tuple[Index, Array]:
-    """Where axes of curved motions change direction, if that matters: owner and fraction, flat."""
+    """Where axes reverse on curved motions, if an error depends on direction: owner and fraction, flat.
+
+    counts (k,) and flat `fraction`: sample points between which a change of direction is searched.
+    """
     bent = np.flatnonzero(intent.curved[rows])
     if intent.arrival is None or not bent.size:
         return np.zeros(0, dtype=np.intp), np.zeros(0)

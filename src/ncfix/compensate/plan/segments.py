@@ -1,11 +1,11 @@
-"""Lines and arcs in the space of commands, and how far axes can stray from the straight way along them.
+"""Lines and arcs of commands, and bounds of how far axes deviate from straight motion along them.
 
-Axes stray while tool-centre-point control leads them. The tip goes straight in the workpiece, at even speed, and the
-rotary axes under the workpiece turn evenly by angles that together are S. A point at most r away from every line about
-which it is turned then has an acceleration, in the base frame and with the fraction of the motion as time, of at most
-S^2 r + 2 S P, where P is the way of the tip in the workpiece; where rotary axes carry the tool, its tip has one more,
-of at most S^2 r with the S and r of these. Whatever has no more acceleration than that strays by no more than an eighth
-of it from its chord. A straight way in the workpiece is nowhere farther from a pivot than at one of its ends.
+Axes deviate under tool-centre-point control. The tip moves straight and evenly in the workpiece, while the rotary axes
+under the workpiece turn evenly by angles whose sum is S. With the fraction of the motion as time, a point within r of
+every line about which it is turned has an acceleration in the base frame of at most S^2 r + 2 S P, where P is the way
+of the tip in the workpiece. Rotary axes that carry the tool add at most S^2 r, with their own S and r. A point deviates
+from its chord by at most an eighth of its acceleration. A straight way in the workpiece is nowhere farther from a pivot
+than at one of its ends.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ class Segments:
     """Motions as the control interpolates them: every axis linear in the fraction; X Y Z of an arc on a circle.
 
     start, end  (n, n_axes) commands, mm and rad
-    arc         (n,) X Y Z go on an arc
-    centre      (n, 3) mm; any point of the arc's axis
-    normal      (n, 3) unit vector along it
-    sweep       (n,) signed angle about it, full turns included, rad
+    arc         (n,) X Y Z move on an arc
+    centre      (n, 3) any point of the axis of an arc, mm
+    normal      (n, 3) unit vector along this axis
+    sweep       (n,) signed angle about it, with full turns, rad
     columns     (3,) the columns of X, Y and Z; -1 for an axis that the machine lacks
 
-    Where start and end are not equally far from the axis, the radius changes linearly with the fraction; so does the
+    If start and end have different distances from the axis, the radius changes linearly with the fraction; so does the
     height along the axis (helix).
     """
 
@@ -55,14 +55,14 @@ class Segments:
         return len(self.start)
 
     def rows(self, rows: Index) -> Segments:
-        """Some of the motions."""
+        """The motions `rows`."""
         ends, centre, normal = (self.start[rows], self.end[rows]), self.centre[rows], self.normal[rows]
         return Segments(*ends, self.arc[rows], centre, normal, self.sweep[rows], self.columns)
 
     def at(self, rows: Index, fraction: Array) -> Array:
-        """The commands at fractions (k,) of motions `rows` (k,), shape (k, n_axes).
+        """(k, n_axes) the commands at fractions (k,) of motions `rows` (k,).
 
-        The end of a motion is known even if its start is not.
+        At fraction 1 the result is the end even if the start is not known.
         """
         command = self.linearly(rows, fraction)
         if self.arc.any():
@@ -72,23 +72,23 @@ class Segments:
         return command
 
     def evenly(self, rows: Index, fraction: Array) -> Array:
-        """The commands at the same fractions (m,), not at ends, of all `rows` (k,), which are arcs, (m, k, n_axes)."""
+        """(m, k, n_axes) the commands at the same fractions (m,), below 1, of motions `rows` (k,), all of them arcs."""
         commands = self.chords(rows, fraction)
         self._onto(commands, slice(None), ArcColumns.of(self, rows).at(fraction[:, None]))
         return commands
 
     def chords(self, rows: Index, fraction: Array) -> Array:
-        """As `evenly`, with X Y Z of arcs on their chords."""
+        """Like `evenly`, but with X Y Z of arcs on their chords."""
         share = fraction[:, None, None]
         return (1 - share) * picked(self.start, rows) + share * picked(self.end, rows)
 
     def _onto(self, command: Array, rows: Index | slice, found: Array) -> None:
-        """Put X Y Z (3, m, k) of some rows into commands (m, ., n_axes)."""
+        """Write X Y Z (3, m, k) of some rows into commands (m, ., n_axes)."""
         for column, value in zip(self.columns.tolist(), found, strict=True):
             command[:, rows, column] = value
 
     def linearly(self, rows: Index, fraction: Array) -> Array:
-        """As `at`, with X Y Z of arcs on their chords."""
+        """Like `at`, but with X Y Z of arcs on their chords."""
         inside = np.flatnonzero(fraction != 1)
         if not inside.size:
             return picked(self.end, rows)
@@ -99,7 +99,7 @@ class Segments:
         return command
 
     def _on_line(self, rows: Index, fraction: Array) -> Array:
-        """The commands at fractions, each axis linear, (k, n_axes)."""
+        """(k, n_axes) the commands at fractions (k,), every axis linear."""
         axes = self.end.shape[1]
         result, end = picked(self.start, rows), picked(self.end, rows)
         result *= spread(1 - fraction, axes)
@@ -110,9 +110,9 @@ class Segments:
 
 @frozen
 class ArcColumns:
-    """Arcs in columns, X Y Z first: at their starts and at their ends where these are, and two ways from the axis.
+    """k arcs as columns, prepared for interpolation.
 
-    start, end  (9, k) mm: the point, the way to it from the axis, and that turned on by a right angle
+    start, end  (9, k) mm, three rows each: the point, its radius vector from the axis, and that turned by a right angle
     sweep       (k,) rad
     """
 
@@ -122,7 +122,7 @@ class ArcColumns:
 
     @classmethod
     def of(cls, arcs: Segments, rows: Index) -> ArcColumns:
-        """Some of the motions, all of which are arcs."""
+        """The motions `rows` (k,), which are all arcs."""
         centre, normal = _columns(arcs.centre, rows), _columns(arcs.normal, rows)
         points = (picked(table, rows).T[arcs.columns] for table in (arcs.start, arcs.end))
         start, end = (_about_axis(each, centre, normal) for each in points)
@@ -130,7 +130,7 @@ class ArcColumns:
 
     @classmethod
     def each(cls, arcs: Segments, rows: Index) -> ArcColumns:
-        """As `of`, of motions that come several times, one after the other."""
+        """Like `of`, for rows in which each motion occurs several times in succession."""
         first = np.flatnonzero(np.diff(rows, prepend=-1))
         found = cls.of(arcs, rows[first])
         if len(first) == len(rows):
@@ -139,7 +139,7 @@ class ArcColumns:
         return cls(found.start.take(own, axis=1), found.end.take(own, axis=1), found.sweep[own])
 
     def at(self, fraction: Array) -> Array:
-        """X Y Z at a fraction of each arc (k,), (3, k); or at the same fractions (m, 1) of all, (3, m, k)."""
+        """X Y Z (3, k) at one fraction of each arc, `fraction` (k,); or (3, m, k) at fractions (m, 1) of all arcs."""
         rest, found = 1 - fraction, np.empty((3, *np.broadcast_shapes(fraction.shape, self.sweep.shape)))
         (sine, versine), (back, least) = turn(fraction * self.sweep), turn((fraction - 1) * self.sweep)
         for i in range(3):
@@ -149,12 +149,12 @@ class ArcColumns:
 
 
 def _columns(table: Array, rows: Index) -> Array:
-    """Rows (k,) of a table (n, 3) as columns (3, k)."""
+    """Rows `rows` (k,) of a table (n, 3) as columns (3, k)."""
     return np.ascontiguousarray(picked(table, rows).T)
 
 
 def _about_axis(point: Array, centre: Array, normal: Array) -> Array:
-    """Points of arcs about axes, all (3, k), the ways to them from the axes, and these turned on by a right angle."""
+    """(9, k) points (3, k) of arcs, their radius vectors from the axes, and these turned by a right angle."""
     result = np.empty((9, point.shape[1]))
     result[:3], arm = point, point - centre
     arm -= dot(normal, arm) * normal
@@ -164,14 +164,14 @@ def _about_axis(point: Array, centre: Array, normal: Array) -> Array:
 
 
 def height(points: Array, normal: Array) -> Array:
-    """How far vectors (k, 3) go along the normals, (k, 1)."""
+    """(k, 1) components of vectors (k, 3) along the normals (k, 3)."""
     return np.einsum("ij,ij->i", points, normal)[:, None]
 
 
 def sweep_between(start: Array, end: Array, centre: Array, normal: Array, like: Array) -> Array:
-    """The signed angle from start to end (k, 3) about the axis, with as many turns as `like` (k,) has, rad.
+    """(k,) signed angle from start to end (k, 3) about the axis, rad: of all that fit, the one nearest to `like` (k,).
 
-    For where the ends of an arc were moved a little: of all angles that fit, the one next to `like`.
+    It is the sweep of an arc with slightly moved ends, with the same number of turns.
     """
     first, last = start - centre, end - centre
     sine = np.einsum("ij,ij->i", vector_product(first, last), normal)
@@ -181,9 +181,10 @@ def sweep_between(start: Array, end: Array, centre: Array, normal: Array, like: 
 
 
 def surely_within(machine: Machine, begin: Array, end: Array, tool_length: float) -> Mask:
-    """(k,) motions that cannot leave the range of an axis between positions begin and end (k, n_axes), mm and rad.
+    """(k,) whether motions under TCP surely stay within the ranges of all axes between positions begin and end.
 
-    tool_length  mm, the longest
+    begin, end   (k, n_axes) axis positions, mm and rad
+    tool_length  the longest tool length, mm
     """
     acceleration = accelerations(machine, begin, end, tool_length)
     if acceleration is None:
@@ -192,7 +193,7 @@ def surely_within(machine: Machine, begin: Array, end: Array, tool_length: float
 
 
 def stays_within(machine: Machine, begin: Array, end: Array, acceleration: Array) -> Mask:
-    """As `surely_within`, of motions with these accelerations at most (k,), see below."""
+    """Like `surely_within`, for motions with a bound of their acceleration (k,), see `accelerations`."""
     turning, stray = machine.rotary, acceleration / 8
     low, high = machine.ranges.T
     room = np.minimum(np.minimum(begin, end) - low, high - np.maximum(begin, end))
@@ -200,9 +201,10 @@ def stays_within(machine: Machine, begin: Array, end: Array, acceleration: Array
 
 
 def arcs_within(machine: Machine, arcs: Segments) -> Mask:
-    """(k,) arcs of commands that are axis positions which cannot leave the range of an axis.
+    """(k,) whether arcs of axis positions surely stay within the ranges of all axes.
 
-    What is between both ends in height is no farther from the arc's axis than the farther end; other axes go straight.
+    Every point of an arc lies between its ends in height, and is no farther from the arc's axis than the farther end.
+    All other axes move linearly.
     """
     begin, end, reach = arcs.start.copy(), arcs.end.copy(), np.zeros(arcs.end.shape)
     for ends in (begin, end):
@@ -217,12 +219,13 @@ def arcs_within(machine: Machine, arcs: Segments) -> Mask:
 def accelerations(
     machine: Machine, begin: Array, end: Array, tool_length: float, way: Array | None = None
 ) -> Array | None:
-    """What no linear axis exceeds along motions between positions begin and end (k, n_axes), (k,) mm per motion^2.
+    """(k,) bound of the acceleration of any linear axis along motions under TCP, mm per motion^2.
 
-    tool_length  mm, the longest
-    way          (k,) mm: of the tip in the workpiece, if known
+    begin, end   (k, n_axes) axis positions at the ends of the motions
+    tool_length  the longest tool length, mm
+    way          (k,) way of the tip in the workpiece, mm, if known
 
-    None where rotary axes carry some of X, Y and Z along.
+    None if rotary axes carry some of X, Y and Z.
     """
     share = skew(machine)
     if share is None:
@@ -244,19 +247,19 @@ def accelerations(
 
 
 def _pivots(machine: Machine, workpiece_side: bool) -> tuple[Index, Array]:
-    """The rotary axes on one side, in the order of the chain: their columns, and points on their lines (k, 3) mm."""
+    """The columns of the rotary axes on one side, in the order of the chain, and (k, 3) points on their lines, mm."""
     found = [k for k, axis in enumerate(machine.axes) if axis.rotary and axis.workpiece_side == workpiece_side]
     points = np.array([machine.axes[k].point for k in found]).reshape(-1, 3)
     return np.array(found, dtype=np.intp), points
 
 
 def _reach(pivots: Array, point: Array) -> float:
-    """How far a point is from pivots (k, 3) at most, mm, whatever turns it about the first, that about the next, ..."""
+    """Largest distance, mm, of a point from pivots (k, 3) if it turns about the first, that about the next, ..."""
     return float(lengths(np.diff(np.vstack((point, pivots)), axis=0)).sum())
 
 
 def skew(machine: Machine) -> float | None:
-    """How far X, Y and Z may have to go for 1 mm of way; None where rotary axes carry them along."""
+    """Largest motion of X, Y or Z for 1 mm of way; None if rotary axes carry them, or their directions are flat."""
     nested = (
         [axis for axis in machine.axes if axis.workpiece_side][::-1],
         [axis for axis in machine.axes if not axis.workpiece_side],
@@ -271,4 +274,4 @@ def skew(machine: Machine) -> float | None:
 
 
 FLAT = 1e-3
-"""Directions of X, Y and Z that span less lie in a plane."""
+"""Least singular value below which the directions of X, Y and Z count as lying in a plane."""

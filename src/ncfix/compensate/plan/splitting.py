@@ -1,21 +1,21 @@
-"""Splitting motions at the fewest places: from each emitted point as far as a piece stays within tolerance.
+"""Splitting motions at the fewest places: each piece goes as far as it stays within the tolerance.
 
-Each motion has a fine grid of nodes with the exactly corrected command of each. A straight piece from node a to node b
-is judged at the nodes between them: there the tip is off by the difference between the command on the piece and the
-exact command, times how the tip follows commands; the error model need not be evaluated again. Differences are of the
-order of the tolerance, so what is left out is smaller by the gradient of the errors (under a thousandth). Where the
-pieces come out short the grid is made finer.
+Each motion has a fine grid of nodes, each with its exactly corrected command. A straight piece from node a to node b is
+judged at the nodes between them: the tip error there is the difference between the command on the piece and the exact
+command, times the derivative of the tip by the commands. The error model need not be evaluated again. The differences
+are of the order of the tolerance, so the neglected part is smaller by the gradient of the errors (under a thousandth).
+If the pieces have few nodes, the grid is refined.
 
-Going as far as possible from each point gives the fewest pieces that can be had with ends on the exact path. All
-motions are worked on at once, and all stretches of those with very many nodes: a round tries one end for each of them.
-The first one tried is as far as the piece before went, then ends ever farther on from there, or back, until the
-farthest is between two that were tried; then the gap is halved.
+To go as far as possible from each point gives the fewest pieces whose ends are on the exact path. All motions are split
+at the same time; motions with very many nodes are divided into stretches. In each round one end is tried for each
+piece: first a piece as long as the one before, then longer or shorter ones in growing steps until the longest possible
+end is bracketed; then the bracket is halved.
 
-Arcs may be made of arcs. A corrected arc need not be an arc: scales that differ make an ellipse of it, play a step
-where an axis reverses. Short arcs follow it with far fewer blocks than straight pieces, and as smoothly. The centre of
-a piece lies on the perpendicular bisector of its ends, so that the radii agree; where along the bisector is found by
-least squares over the nodes between. Pieces too short for a control to tell their centre are straight, and so are those
-that bend the other way than the arc turns: a control would go the long way round.
+Arcs may be split into arcs. A corrected arc is in general no arc: different scales make an ellipse of it, play makes a
+step where an axis reverses. Short arcs follow it smoothly, with far fewer blocks than straight pieces. The centre of a
+piece lies on the perpendicular bisector of its ends, so that its radii agree; its place on the bisector is found by
+least squares over the nodes between. Pieces too short for a control to determine their centre are straight, and so are
+pieces that bend against the sense of the arc, for which a control would go the long way round.
 """
 
 from __future__ import annotations
@@ -53,31 +53,31 @@ from ncfix.values import frozen
 from ncfix.writer.target import TANGENTIAL
 
 STRETCH = 1024
-"""Nodes of a motion after which a piece ends in any case."""
+"""Number of nodes of a motion after which a piece ends in any case."""
 
 
 class Splittable(Protocol):
-    """Motions with nodes between which there may be pieces."""
+    """Motions divided by nodes, at which pieces may begin and end."""
 
     @property
     def counts(self) -> Index:
-        """(g,) nodes of each motion, its start and end included; at least 2."""
+        """(g,) number of nodes of each motion, including its start and end; at least 2."""
 
     def deviations(self, first: Index, last: Index) -> Array:
-        """The largest deviation of pieces from nodes `first` to nodes `last` (flat indices), (p,) mm."""
+        """(p,) the largest deviation of pieces from nodes `first` to nodes `last` (flat indices), mm."""
 
     def shape(self, first: Index, last: Index) -> tuple[Mask, Array]:
-        """Which pieces are arcs (p,), and their centres (p, 3)."""
+        """(p,) whether the pieces between nodes `first` and `last` are arcs, and their centres (p, 3), mm."""
 
 
 @frozen(slots=False)
 class PathNodes:
-    """Nodes of motions, flat, all nodes of a motion next to each other.
+    """The nodes of motions for straight pieces, flat, motion after motion.
 
-    counts    (g,) nodes of each motion, its start and end included; at least 2
-    fraction  (k,) ascending from 0 to 1 in each motion
-    command   (k, n_axes) exactly corrected command; at the start where the machine really stands
-    follow    (k or 1, 3, n_axes) how the tip follows the command there, mm per mm and mm per rad
+    counts    (g,) number of nodes of each motion, including its start and end; at least 2
+    fraction  (k,) fraction of the motion at each node, ascending from 0 to 1
+    command   (k, n_axes) exactly corrected command; at the start, where the machine really stands
+    follow    (k or 1, 3, n_axes) derivative of the tip by the command at each node, mm per mm and mm per rad
     """
 
     counts: Index
@@ -86,7 +86,7 @@ class PathNodes:
     follow: Array
 
     def deviations(self, first: Index, last: Index) -> Array:
-        """The largest deviation of straight pieces from nodes `first` to nodes `last` (flat indices), (p,) mm."""
+        """(p,) the largest deviation of straight pieces from nodes `first` to nodes `last` (flat indices), mm."""
         inner, fraction, (commands, follows) = last - first - 1, self.fraction, self._columns
         begun, ended = np.repeat(first, inner), np.repeat(last, inner)
         node = begun + 1 + places(inner)
@@ -101,7 +101,7 @@ class PathNodes:
 
     @cached_property
     def _columns(self) -> tuple[Array, list[tuple[int, int, Array]]]:
-        """Commands (n_axes, k), and axis, direction and how the tip follows (k or 1,), wherever it follows at all."""
+        """Commands as columns (n_axes, k), and the non-zero derivatives of the tip: axis, direction, values."""
         axes, rows = np.nonzero(self.follow.any(axis=0).T)
         follows = [(j, i, self.follow[:, i, j].copy()) for j, i in zip(axes.tolist(), rows.tolist(), strict=True)]
         return np.ascontiguousarray(self.command.T), follows
@@ -112,9 +112,9 @@ class PathNodes:
 
 
 def fewest(grid: Splittable, tolerance: float) -> tuple[Mask, Array]:
-    """Which nodes end a piece (k,), and the largest deviation of each motion's pieces (g,) mm.
+    """(k,) the nodes at which pieces end, and (g,) the largest deviation of the pieces of each motion, mm.
 
-    A piece from one node to the next is always allowed: it has no nodes between.
+    A piece from a node to the next is always allowed, because no node lies between.
     """
     if core.engaged() and isinstance(grid, PathNodes):
         from ncfix.core import motions as loops
@@ -152,7 +152,7 @@ def fewest(grid: Splittable, tolerance: float) -> tuple[Mask, Array]:
 
 
 def _stretches(counts: Index) -> tuple[Index, Index, Index]:
-    """How many stretches motions with `counts` (g,) nodes have; the first and the last node of each stretch."""
+    """(g,) number of stretches of motions with `counts` (g,) nodes, and the first and last node of each stretch."""
     many = np.maximum((counts - 1) // STRETCH, 1)
     begin = offsets(counts)[:-1][owners(many)] + places(many) * STRETCH
     end = begin + STRETCH
@@ -161,30 +161,35 @@ def _stretches(counts: Index) -> tuple[Index, Index, Index]:
 
 
 def _next_trial(at: Index, near: Index, far: Index, stop: Index, step: Index) -> Index:
-    """The next end to be tried, where `near` is good and `far` is not, or has not been tried if it is behind `stop`."""
+    """The next ends to try for pieces from nodes `at`, between `near`, which is good, and `far`, which is not.
+
+    `far` behind the last node `stop` means that no end has failed yet.
+    """
     half = (near + far) // 2
     back = np.where(near > at + 1, half, np.maximum(far - step, half))
     return np.where(far > stop, np.minimum(near + step, stop), back)
 
 
 WIDEST = 0.95 * np.pi
-"""A piece turns by less than this: ends on opposite sides of a circle would not tell where its centre is."""
+"""Largest turn, rad, of an arc piece: ends on opposite sides of a circle would not determine its centre."""
 SHORTEST = 0.05
-"""mm between the ends of the shortest arc that is written."""
+"""Least distance, mm, between the ends of an arc piece."""
 
 JUMP = 2.0
-"""Times the way along the arc: a piece that is longer only takes up a jump (play, a step), which is no circle."""
+"""Largest chord of an arc piece, as a multiple of its way along the arc. A longer one only takes up a jump (play, a
+step), and is straight."""
 
 
 OTHER_CODES = 1000
-"""Motion codes in tenths from here on are no G codes."""
+"""Least motion code, in tenths, that is not a G code."""
 
 
 def may_be_round(intent: Intent, rows: Index, closure: Closure, rounding: float) -> Mask:
-    """Motions `rows` (k,) that may be made of arcs: radii off by rounding are within half of what the control takes.
+    """(k,) whether motions `rows` are arcs that may be split into arcs.
 
-    Arcs that are not given by a centre or radius (CIP, whose code is none of G0 to G99) stay whole or become straight,
-    unless they are written as others.
+    The difference of radii by rounding must be within half of what the control accepts. Arcs that are not given by a
+    centre or radius (CIP, whose code is none of G0 to G99) stay whole or become straight pieces, unless they can be
+    written with another code.
     """
     moves, radius = intent.moves, radii(intent, rows)
     allowed = np.maximum(closure.mm, closure.relative * radius) / 2
@@ -194,7 +199,7 @@ def may_be_round(intent: Intent, rows: Index, closure: Closure, rounding: float)
 
 
 def radii(intent: Intent, rows: Index) -> Array:
-    """The radius of each arc (k,), mm."""
+    """(k,) the radius of each arc of motions `rows`, mm."""
     moves = intent.moves
     spoke = moves.end[rows[:, None], intent.columns] - moves.centre[rows]
     return np.linalg.norm(across(spoke, moves.normal[rows]), axis=1)
@@ -202,12 +207,13 @@ def radii(intent: Intent, rows: Index) -> Array:
 
 @frozen
 class RoundGrid:
-    """Nodes of arcs, as `PathNodes` has them, between which pieces are arcs.
+    """The nodes of arcs that are split into arcs.
 
-    normal   (k, 3) of each node's motion
-    sweep    (k,) of each node's motion, rad
-    radius   (k,) of each node's motion, mm
-    columns  (3,) of X, Y and Z
+    grid     the nodes
+    normal   (k, 3) normal of each node's motion
+    sweep    (k,) sweep of each node's motion, rad
+    radius   (k,) radius of each node's motion, mm
+    columns  (3,) columns of X, Y and Z
     """
 
     grid: PathNodes
@@ -218,17 +224,17 @@ class RoundGrid:
 
     @classmethod
     def of(cls, grid: PathNodes, intent: Intent, rows: Index) -> RoundGrid:
-        """Nodes of motions `rows`, which are arcs."""
+        """The nodes of motions `rows`, which are all arcs."""
         move, moves = rows[owners(grid.counts)], intent.moves
         return cls(grid, moves.normal[move], moves.sweep[move], radii(intent, move), intent.columns)
 
     @property
     def counts(self) -> Index:
-        """Nodes of each motion."""
+        """(g,) number of nodes of each motion."""
         return self.grid.counts
 
     def deviations(self, first: Index, last: Index) -> Array:
-        """The largest deviation of pieces from nodes `first` to nodes `last`, (p,) mm; infinite for too wide a turn."""
+        """(p,) the largest deviation of pieces from nodes `first` to nodes `last`, mm; inf beyond `WIDEST`."""
         inner = last - first - 1
         arcs, share = self._between(first, last)
         off = self._off(arcs, first + 1, inner, share)
@@ -238,7 +244,7 @@ class RoundGrid:
         return np.where(wide & (inner > 0), np.inf, worst)
 
     def shape(self, first: Index, last: Index) -> tuple[Mask, Array]:
-        """Which pieces are arcs (p,), and their centres (p, 3)."""
+        """See `Splittable.shape`."""
         arcs, _ = self._between(first, last)
         return arcs.arc, arcs.centre
 
@@ -246,7 +252,7 @@ class RoundGrid:
         return self.sweep[first] * (self.grid.fraction[last] - self.grid.fraction[first])
 
     def _between(self, first: Index, last: Index) -> tuple[Segments, Array]:
-        """The pieces, and the shares (flat) of each at which its inner nodes are."""
+        """The pieces from nodes `first` to nodes `last`, and the fractions (flat) of each at its inner nodes."""
         command, fraction = self.grid.command, self.grid.fraction
         inner = last - first - 1
         piece = owners(inner)
@@ -280,7 +286,7 @@ class RoundGrid:
 
 
 def _on_bisector(pieces: Segments, way: Array, height: Array) -> Segments:
-    """Pieces with the centre so far (p,) mm from the middle of the chord along `way` (p, 3), unit vectors."""
+    """The pieces with their centres `height` (p,) mm from the middle of the chord along unit vectors `way` (p, 3)."""
     start, end = pieces.start[:, pieces.columns], pieces.end[:, pieces.columns]
     rise = np.einsum("ij,ij->i", end - start, pieces.normal)[:, None] * pieces.normal
     centre = (start + end - rise) / 2 + height[:, None] * way
@@ -289,30 +295,30 @@ def _on_bisector(pieces: Segments, way: Array, height: Array) -> Segments:
 
 
 PER_BEND = 8
-"""Nodes for each time that the error may bend."""
+"""Number of nodes for each time that the error may bend."""
 PER_PIECE = 32
-"""Nodes to each piece expected; a piece is longest to one part in so many."""
+"""Number of nodes for each expected piece; the length of a piece is optimal to one part in this number."""
 FEW = 14
-"""Pieces with fewer nodes on average are worth a finer grid."""
+"""Average number of nodes per piece below which the grid is refined."""
 SPARSE = 4
-"""Pieces with fewer have not been looked at in between."""
+"""Average number of nodes per piece below which the pieces have not been examined closely enough."""
 REFINEMENTS = 3
 INSTANT = 1e-7
 """Fraction of a motion from one side of a jump or reversal to the other."""
 BATCH = 100_000
-"""Nodes worked on at a time."""
+"""Number of nodes worked on at a time."""
 
 
 @frozen
 class Split:
-    """Motions made of pieces, flat, the pieces of a motion next to each other.
+    """The pieces of motions, flat, motion after motion.
 
-    counts    (g,) pieces of each motion
-    fraction  (p,) where each ends on its motion
-    end       (p, n_axes) commands
+    counts    (g,) number of pieces of each motion
+    fraction  (p,) fraction of the motion at which the piece ends
+    end       (p, n_axes) command at the end of the piece
     arc       (p,) the piece is an arc
-    centre    (p, 3) its centre then, mm
-    worst     (g,) largest deviation of the tip found, mm
+    centre    (p, 3) centre of an arc, mm
+    worst     (g,) largest deviation of the tip along the pieces, mm
     """
 
     counts: Index
@@ -325,10 +331,10 @@ class Split:
 
 @frozen
 class Cutter:
-    """What motions are cut for.
+    """The conditions by which motions are split.
 
-    tolerance  how far the tip may be off between the ends of a piece, mm
-    round      pieces are arcs (all motions are, then), not straight
+    tolerance  largest deviation of the tip between the ends of a piece, mm
+    round      split arcs into arcs; else into straight pieces
     """
 
     strategy: Strategy
@@ -339,10 +345,10 @@ class Cutter:
 def split(intent: Intent, real: Segments, rows: Index, pieces: Array, cutter: Cutter) -> Split:
     """Split motions `rows` (g,) at the fewest places.
 
-    real    where all motions really start and end
+    real    the corrected starts and ends of all motions
     pieces  (g,) about how many pieces to expect
 
-    Of motions that are too long to be looked at between so many pieces the largest deviation is infinite.
+    `worst` is infinite for motions that need so many pieces that these cannot be examined in between.
     """
     if not rows.size:
         empty = np.empty(0)
@@ -393,7 +399,7 @@ def _split(intent: Intent, real: Segments, rows: Index, nodes: Index, cutter: Cu
 
 
 def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: Strategy) -> PathNodes:
-    """Exactly corrected commands of motions at nodes; at both ends where the machine really stands."""
+    """The nodes of motions `rows`, with exactly corrected commands; at both ends, those of `real`."""
     counts, fraction = _fractions(intent, real, rows, nodes)
     move = rows[owners(counts)]
     ends = offsets(counts)
@@ -406,8 +412,8 @@ def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: S
     if strategy.corrects_orientation:
         decided = np.where(bounds[:, None], real.at(move, fraction) - programmed, 0.0)
         path = path_of(intent, q, intent.machine.tip(q, intent.lengths(move)), fraction == 0, bounds, decided)
-    found = strategy.solve(intent.machine, q, intent.states(move, fraction), path)
-    result = with_rotary_held(intent, strategy, move, fraction, q, found)
+    solved = strategy.solve(intent.machine, q, intent.states(move, fraction), path)
+    result = with_rotary_held(intent, strategy, move, fraction, q, solved)
     command = as_commands(intent, move, programmed, q, result.q)
     command[first], command[last] = real.start[rows], real.end[rows]
     command = _as_they_stand(intent, real, move, fraction, command)
@@ -419,7 +425,7 @@ def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: S
 
 
 def _as_they_stand(intent: Intent, real: Segments, move: Index, fraction: Array, command: Array) -> Array:
-    """Corrected commands (k, n_axes) with the axes that get no word as `real` has them, X Y Z for such rotary axes."""
+    """Corrected commands (k, n_axes) with axes that get no word as in `real`; X Y Z are solved for such rotary axes."""
     if intent.idle is None:
         return command
     stand, idle = real.at(move, fraction), intent.idle[move]
@@ -432,10 +438,10 @@ def _as_they_stand(intent: Intent, real: Segments, move: Index, fraction: Array,
 
 
 def _fractions(intent: Intent, real: Segments, rows: Index, nodes: Index) -> tuple[Index, Array]:
-    """Fractions of the nodes of motions, both ends included: counts and flat fractions.
+    """The fractions of the nodes of motions, including both ends: counts (g,) and flat fractions.
 
-    Nodes stand evenly, behind the start, and on both sides of wherever the corrected axes pass a kink or a jump, or
-    reverse if that matters.
+    There are evenly spaced nodes, one right behind the start, and nodes on both sides of each place at which the
+    corrected axes pass a kink or a jump, or reverse if an error depends on direction.
     """
     counts = nodes + 3
     fraction = (places(counts) - 1) / np.repeat(nodes + 1, counts)
@@ -453,11 +459,11 @@ def _fractions(intent: Intent, real: Segments, rows: Index, nodes: Index) -> tup
 
 
 def _follow(intent: Intent, rows: Index, commands: Array, strategy: Strategy) -> Array:
-    """How the tip follows commands (k, n_axes) of motions `rows`, (k or 1, 3, n_axes) mm per mm and mm per rad.
+    """(k or 1, 3, n_axes) derivative of the tip by commands (k, n_axes) of motions `rows`, mm per mm and mm per rad.
 
-    As seen from where is all the same to the size of a deviation. Where X, Y and Z turn together and nothing else is
-    corrected, that is from where they move, so that one is for all. With tool-centre-point control the tip stays where
-    it is when only rotary commands change.
+    Only the size of a deviation matters, so any frame will do. If X, Y and Z are carried together and only they are
+    corrected, the frame in which they move is taken, and one row is valid for all. Under tool-centre-point control the
+    tip does not move with rotary commands.
     """
     together = intent.machine.linear_ways
     if together is not None and not strategy.corrects_orientation:

@@ -1,7 +1,8 @@
-"""Strategies: which command makes the erroneous machine do what the program meant, and what each of them leaves.
+"""Strategies: ways to find the commands with which the erroneous machine does what the program means.
 
-All of them take axis positions and give corrected axis positions, many poses at a time, by the exact forward model of
-the machine. A strategy is stateless; `solve` tells for each pose how it went, `correct` raises where it did not.
+Each takes axis positions and returns corrected axis positions, many poses at a time, by the exact forward model of the
+machine; each says which error it leaves. A strategy is stateless. `solve` tells for each pose whether it succeeded,
+`correct` raises if it did not.
 """
 
 from __future__ import annotations
@@ -28,18 +29,18 @@ from ncfix.machine import Axis, Effect, Machine, State
 from ncfix.values import frozen
 
 APART = 1.0
-"""rad of allowance between stretches that have nothing to do with each other; above any rotary correction."""
+"""Allowed change, rad, of a rotary correction between separate stretches: above any correction, so no limit."""
 
 
 @frozen
 class PoseSequence:
-    """How poses follow each other, for limits on rates.
+    """The order and the distances of poses along a path, for limits on the rate of corrections.
 
     travel_mm   (n,) way of the tool tip in the workpiece from the pose before, mm
     travel_rad  (n,) way of the rotary axes from the pose before, rad
-    begins      (n,) the pose begins a new stretch: what was before puts no limit on it
-    pinned      (n,) the correction of this pose is decided already and stands in `decided`
-    decided     (n, n_rotary) rad; read where pinned
+    begins      (n,) the pose begins a new stretch: the pose before puts no limit on it
+    pinned      (n,) the correction of this pose is given by `decided`
+    decided     (n, n_rotary) given rotary corrections of pinned poses, rad
     """
 
     travel_mm: Array
@@ -49,23 +50,26 @@ class PoseSequence:
     decided: Array
 
     def rows(self, rows: Index) -> PoseSequence:
-        """Some of the poses; where poses are left out a new stretch begins."""
+        """The poses `rows`. Behind poses that are left out a new stretch begins."""
         begins = self.begins[rows].copy()
         begins[1:] |= np.diff(rows) != 1
         return PoseSequence(self.travel_mm[rows], self.travel_rad[rows], begins, self.pinned[rows], self.decided[rows])
 
     def allowance(self, per_mm: float, per_rad: float) -> Array:
-        """By how much a correction may have changed since the first pose, (n,) rad, never descending."""
+        """(n,) largest change of a rotary correction since the first pose, rad, never descending.
+
+        per_mm, per_rad  allowed change per way of the tip, rad/mm, and of the rotary axes, rad/rad
+        """
         step = per_mm * self.travel_mm + per_rad * self.travel_rad
         return np.cumsum(np.where(self.begins, APART, step))
 
 
 def limited(correction: Array, path: PoseSequence, per_mm: float, per_rad: float) -> Array:
-    """Rotary corrections (n, k) that change no faster along the path than allowed, near the given ones.
+    """Rotary corrections (n, k), rad, close to the given ones, that change no faster along the path than allowed.
 
-    The mean of the largest function below and the smallest above the given values that keep the rate (McShane's
-    extensions): where the given values keep it, they come out as they are. Decided values are met exactly if they keep
-    the rate among themselves.
+    They are the mean of the largest function below and the smallest function above the given values that keep the rate
+    (McShane's extensions), so values that keep the rate are unchanged. Pinned values are met exactly if they keep the
+    rate among themselves.
     """
     travel = path.allowance(per_mm, per_rad)[:, None]
     smooth = (_lowest(correction, travel) - _lowest(-correction, travel)) / 2
@@ -85,9 +89,9 @@ def _lowest(values: Array, travel: Array) -> Array:
 class Strategy(ABC):
     """A way to correct poses.
 
-    name                  as in `--strategy`
-    leaves                one sentence: what error remains
-    corrects_orientation  the rotary axes are changed too
+    name                  its name in `--strategy`
+    leaves                the error that it leaves, in one sentence
+    corrects_orientation  the rotary axes are corrected too
     follows_path          motions may be split to keep the path between their ends
     """
 
@@ -98,9 +102,10 @@ class Strategy(ABC):
 
     @abstractmethod
     def solve(self, machine: Machine, q: Array, state: State, path: PoseSequence | None = None) -> Correction:
-        """Corrected axis positions for poses q (n, n_axes) [mm, rad] that were meant for a perfect machine.
+        """Corrected axis positions for poses q (n, n_axes), mm and rad, of a perfect machine.
 
-        `path` tells how the poses lie along the path, for strategies with limits on rates. The state broadcasts.
+        path   order and distances of the poses along the path, for strategies that limit rates
+        state  tool length, direction and inputs; broadcast over the poses
         """
 
     def correct(self, machine: Machine, q: Array, state: State) -> Array:
@@ -116,7 +121,7 @@ class Strategy(ABC):
 
 
 class PositionStrategy(Strategy):
-    """The tool tip exactly, by Newton's method on the whole model; rotary axes keep their values."""
+    """Brings the tool tip to its exact place by Newton's method on the whole model; rotary axes keep their values."""
 
     name = "position"
     leaves = "The orientation of the tool is left as the machine makes it; rotary axes keep their values."
@@ -127,21 +132,21 @@ class PositionStrategy(Strategy):
 
 
 class RotaryThenLinear(PositionStrategy):
-    """Ellingsdalen's order: the error of the rotary axes first, then the linear axes' error where that leads.
+    """Ellingsdalen's order: the error of the rotary axes first, then that of the linear axes at the place so found.
 
-    S. H. Ellingsdalen (NTNU, 2021), sections 3.5 and 3.6, with its signs put right and repeated. A single pass moves
-    X Y Z so that a machine with the errors of its rotary axes only brings the tip to the intended point, reads the
-    errors of all other joints there and takes them off. Further passes take off what the whole machine still leaves,
-    until that is below 1 nm: the linear errors are then those at the commanded coordinates, and products of rotary and
-    linear errors are in. It does not matter then how the first one began, so they begin at the program's position.
-    Works on any chain: it does not matter which side a rotary axis is on.
+    S. H. Ellingsdalen (NTNU, 2021), sections 3.5 and 3.6, with corrected signs, and iterated. A single pass moves X Y Z
+    so that a machine with rotary errors only brings the tip to the intended point, and then subtracts the errors of all
+    other joints at this place. Further passes subtract the error that the whole machine still leaves, until it is below
+    1 nm. The linear errors are then those at the commanded coordinates, and products of rotary and linear errors are
+    included. The result does not depend on the first pass, so the iteration begins at the program's position, as in
+    `PositionStrategy`. It works on any chain, with rotary axes on either side.
     """
 
     name = "rotary-then-linear"
 
 
 def untouched(q: Array) -> Correction:
-    """Nothing to correct: exactly the poses as they are."""
+    """The correction that leaves the poses as they are."""
     return Correction(q.copy(), np.isfinite(q.sum(axis=1)), np.ones(len(q), dtype=bool))
 
 
@@ -153,7 +158,7 @@ def strategies() -> dict[str, Strategy]:
 
 
 def get_strategy(name: str) -> Strategy:
-    """The strategy of that name. Raises `UsageError` NCF411."""
+    """The strategy `name`. Raises `UsageError` NCF411 if there is none."""
     found = strategies()
     if name not in found:
         raise UsageError.of("NCF411", f"there is no strategy {name!r}", hint=f"one of {', '.join(found)}")
@@ -161,26 +166,27 @@ def get_strategy(name: str) -> Strategy:
 
 
 SETTLED = 1e-9
-"""rad; rotary corrections that change less from pass to pass are settled. 1e-9 rad is 1 nm at 1 m."""
+"""Change of a rotary correction between passes, rad, below which it has converged. 1e-9 rad is 1 nm at 1 m."""
 PASSES = 12
 CONE = 0.02
-"""Smallest singular value (rad of tilt per rad of rotary axis) below which it is always damped: about 1 degree."""
+"""Singular value, rad of tilt per rad of a rotary axis, below which a correction is always damped: about 1 degree from
+the pole."""
 GAIN = 1.2
 """Just above 2 / sqrt(3), the largest correction per error times the bound (at a singular value of bound / sqrt(3))."""
 
 
 class Full(Strategy):
-    """Position exactly, tool direction by least squares, damped near singular poses, limited in size and in rate.
+    """Corrects the position exactly, and the tool direction by least squares, damped and limited in size and rate.
 
     most      largest correction of a rotary axis, rad; None: the machine's `max_correction`
-    per_mm    how much a rotary correction may change per mm of the tip's way, rad/mm
-    per_rad   and per rad of the rotary axes' way
+    per_mm    largest change of a rotary correction per way of the tip, rad/mm
+    per_rad   the same per way of the rotary axes, rad/rad
 
-    A correction never takes a rotary axis out of the travel that the program keeps to; the tip is held all the same.
+    A correction never takes a rotary axis beyond its travel if the program stays within; the tip is right all the same.
 
-    Near a pose in which a rotary axis turns the tool about itself, a small tilt needs a large turn of that axis. Its
-    correction is damped there (Nakamura and Hanafusa 1986: the damping grows as the smallest singular value falls below
-    a bound), so that it fades to nothing in the pole and never exceeds the limit.
+    Near a pose in which a rotary axis turns the tool about itself, a small tilt needs a large turn of that axis. There
+    its correction is damped (Nakamura and Hanafusa 1986: the damping grows as the smallest singular value falls below a
+    bound), so that it vanishes at the pole and never exceeds the limit.
     """
 
     name = "full"
@@ -216,7 +222,7 @@ class Full(Strategy):
     def _known_only(
         self, machine: Machine, q: Array, state: State, path: PoseSequence | None, known: Mask
     ) -> Correction:
-        """Poses with numbers missing are left alone; they end a stretch of the path."""
+        """Solve for the `known` poses (n,). The others, which have NaN, stay as they are and divide the path."""
         rows = np.flatnonzero(known)
         rest = None if path is None else path.rows(rows)
         result = self.solve(machine, q[rows], rows_of(state, rows), rest)
@@ -225,10 +231,10 @@ class Full(Strategy):
         return Correction(corrected, converged, oriented)
 
     def _tilted(self, machine: Machine, q: Array, state: State, most: float) -> tuple[Array, Mask]:
-        """Positions with the rotary axes corrected and X Y Z nearly so, and which poses are free of damping.
+        """Positions with corrected rotary axes and nearly corrected X Y Z, and (n,) poses whose correction is undamped.
 
-        The damped step is taken from the error that would be there without it: repeated damped steps would add up to
-        an undamped one.
+        Every pass takes the damped step from the error that remains without any rotary correction, because repeated
+        damped steps would add up to an undamped one.
         """
         rotary, columns = machine.rotary, linear_columns(machine)
         corrected, free = q.copy(), np.zeros(len(q), dtype=bool)
@@ -253,7 +259,7 @@ class Full(Strategy):
 
 
 def _within_travel(machine: Machine, q: Array, turn: Array) -> Array:
-    """Corrected rotary positions (n, n_rotary), held at the end of the travel that the program keeps to, rad."""
+    """(n, n_rotary) corrected rotary positions, rad, clipped to the travel, or to the position q if it is beyond."""
     low, high = machine.ranges[machine.rotary].T
     return np.clip(q + turn, np.minimum(low, q), np.maximum(high, q))
 
@@ -264,13 +270,13 @@ def apply(matrices: Array, vectors: Array) -> Array:
 
 
 def damped(tilts: Array, error: Array, most: float) -> tuple[Array, Mask]:
-    """Rotary corrections that take off a tilt, by least squares with damping.
+    """Rotary corrections that remove a tilt of the tool, by damped least squares.
 
-    tilts  (n, 2, k) tilt of the tool per rad of each rotary axis
-    error  (n, 2) tilt to take off, rad
-    most   no rotary axis is corrected by more, rad
+    tilts  (n, 2, k) tilt of the tool per turn of each rotary axis, rad/rad
+    error  (n, 2) tilt to remove, rad
+    most   largest correction of a rotary axis, rad
 
-    Returns (n, k) rad, and where nothing was damped (n,).
+    Returns the corrections (n, k), rad, and (n,) whether they are undamped.
     """
     squares, ways = np.linalg.eigh(np.swapaxes(tilts, 1, 2) @ tilts)
     size = np.sqrt(np.einsum("ij,ij->i", error, error))
@@ -307,14 +313,15 @@ def small_turn(actual: Array, nominal: Array) -> Array:
 
 
 class Thesis(Strategy):
-    """Ellingsdalen's compensation as it is printed, to reproduce its numbers: one pass, points only.
+    """Ellingsdalen's compensation as printed, to reproduce its numbers: one pass, points only.
 
     For linear axes on the tool side and rotary axes under the workpiece. S. H. Ellingsdalen, "Improving the Accuracy of
     a Five-Axis Machine Tool by Laser Tracker Calibration" (NTNU, 2021), sections 3.5 and 3.6 and listings 3.3 and 3.4.
-    What differs from a sound correction, on purpose:
+    It differs from a sound correction on purpose:
 
-    - errors are read at the nearest whole millimetre or degree (halves to even), their value at zero taken off;
-    - angles of linear axes do nothing, squareness of Y and Z with X as datum is all that is known of their location;
+    - errors are read at the nearest whole millimetre or degree (halves to even), minus their value at zero;
+    - angular error motions of linear axes have no effect, and the only location errors are the squarenesses of Y and Z
+      with X as datum;
     - errors of the rotary axes act in base axes about the base origin, in whatever frame they were identified;
     - the listing reads the positioning error E_C. of a rotary axis from the file of E_B., and turns about Y the wrong
       way;
@@ -350,7 +357,7 @@ class Thesis(Strategy):
 
 
 def motion_errors(machine: Machine, axis: Axis, q: Array) -> Array:
-    """The six error motions of an axis at the nearest whole millimetre or degree, (n, 6) mm and rad; none at zero."""
+    """(n, 6) error motions of an axis at the nearest whole millimetre or degree, minus those at zero, mm and rad."""
     position = np.rint(q[:, machine.axis_names.index(axis.name)] / axis.unit)
     errors = np.zeros((len(q), 6))
     for effect in machine.effects:
@@ -360,7 +367,7 @@ def motion_errors(machine: Machine, axis: Axis, q: Array) -> Array:
 
 
 def linear_deviation(machine: Machine, q: Array) -> Array:
-    """What the translations of the linear axes and the squareness of Y and Z do to the tip, (n, 3) mm, base axes."""
+    """(n, 3) tip error by the translations of the linear axes and the squarenesses of Y and Z, mm, in base axes."""
     linear = [axis for axis in machine.axes if not axis.rotary]
     total: Array = sum((motion_errors(machine, axis, q)[:, :3] for axis in linear), np.zeros((len(q), 3)))
     x_y, x_z, y_z = (squareness(machine, name) for name in ("EC0Y", "EB0Z", "EA0Z"))
@@ -371,16 +378,16 @@ def linear_deviation(machine: Machine, q: Array) -> Array:
 
 
 def squareness(machine: Machine, name: str) -> float:
-    """The location error of that name, rad; 0 if the machine has none."""
+    """Squareness (ISO 230-1 location error) `name`, rad; 0 if the machine does not define it."""
     return sum(sum(effect.coefficients) for effect in machine.effects if effect.name == name)
 
 
 def rotary_shift(errors: list[Array], point: Array, as_printed: bool = True) -> Array:
-    """What to add to X Y Z for the errors of the rotary axes: actual minus ideal point, (n, 3) mm.
+    """(n, 3) the shift of X Y Z for the errors of the rotary axes: actual minus ideal point, mm.
 
-    errors      (n, 6) of each rotary axis, from the foundation to the workpiece
-    point       (n, 3) the ideal point in the base frame
-    as_printed  with the two slips of listing 3.3 (E_C. read from E_B.'s file, the wrong way about Y)
+    errors      for each rotary axis (n, 6) error motions, mm and rad, from the foundation to the workpiece
+    point       (n, 3) ideal point in the base frame, mm
+    as_printed  with the two slips of listing 3.3 (E_C. read from E_B.'s file, the wrong sense about Y)
     """
     actual = point
     for each in reversed(errors):
@@ -394,7 +401,7 @@ def rotary_shift(errors: list[Array], point: Array, as_printed: bool = True) -> 
 
 
 def _about(points: Array, axis: int, angle: Array) -> Array:
-    """Points turned about a base axis, right-handed, (n, 3)."""
+    """(n, 3) points turned about base axis 0, 1 or 2 (x, y, z) by angles (n,), rad, right-handed."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
     turned = points.copy()
     turned[:, first] = np.cos(angle) * points[:, first] - np.sin(angle) * points[:, second]
@@ -403,5 +410,5 @@ def _about(points: Array, axis: int, angle: Array) -> Array:
 
 
 def _value(effect: Effect, position: Array) -> Array:
-    """An effect at axis positions in mm or degrees, (n,)."""
+    """(n,) value of an effect at axis positions (n,), mm or degrees."""
     return effect.basis.design((position - effect.center) / effect.scale) @ np.asarray(effect.coefficients)

@@ -1,15 +1,14 @@
-"""Corrected motions as they are written: the geometry of their pieces, and what the control's digits make of them.
+"""Corrected motions as they are written: the geometry of their pieces, and the effect of rounding to output steps.
 
-Rotary positions are put on the digits that will be written, and X Y Z are solved again: a rotary axis resolves 0.001
-degree, say, which is 1.7 um at 100 mm. Pieces that do not move once their numbers are rounded would be blocks without a
-word. They come where an error jumps: a motion is cut on both sides of the jump, 1e-7 of its length apart, and what has
-to change there may be less than the digits show; then both pieces end in the same place.
+Rotary positions are rounded to the digits that will be written, and X Y Z are solved again: a rotary axis may resolve
+0.001 degree, which is 1.7 um at 100 mm. Pieces that do not move after rounding would be blocks without a word, and are
+removed. They occur where an error jumps: a motion is split on both sides of the jump, 1e-7 of its length apart, and the
+jump may be smaller than an output step.
 
-What rounding does to the path is an account of its own, on top of the tolerance. Every number is off by up to half an
-output step. At the end of a motion that is half a step in each linear axis. On the way of an arc its centre is off,
-too: in the middle of a turn by `a` that counts 1 - cos(a / 2) times, twice on a full circle. Where a rotary axis turns
-the tool stands on another arm between the ends of a piece than at them, and half a step of the axis counts by what the
-arm has changed.
+The effect of rounding on the path comes on top of the tolerance. Every number is off by up to half an output step. At
+the end of a motion that is half a step in each linear axis. Along an arc its centre is off, too: in the middle of a
+turn by `a` that counts 1 - cos(a / 2) times, twice on a full circle. If a rotary axis turns during a piece, the lever
+arm of the tool differs from that at the ends, and half a step of the axis counts by the change of this arm.
 """
 
 from __future__ import annotations
@@ -35,9 +34,9 @@ from ncfix.writer.pieces import Pieces
 
 @frozen(slots=False)
 class WrittenPieces:
-    """Pieces on a program on a machine.
+    """The corrected pieces of the motions of a program on a machine.
 
-    start  (n, n_axes) the command at which each motion really starts; NaN where not known
+    start  (n, n_axes) the command at which each motion really starts; NaN if not known
     """
 
     intent: Intent
@@ -46,12 +45,12 @@ class WrittenPieces:
 
     @cached_property
     def before(self) -> Array:
-        """The fraction of the motion at which each piece starts, (m,)."""
+        """(m,) the fraction of its motion at which each piece starts."""
         return self.pieces.begun
 
     @cached_property
     def span(self) -> Array:
-        """The part of the motion that each piece covers, (m,)."""
+        """(m,) the fraction of its motion that each piece covers."""
         return self.pieces.fraction - self.before
 
     @cached_property
@@ -73,43 +72,43 @@ class WrittenPieces:
         return Segments(start, pieces.end, arc, pieces.centre, normal, found, columns)
 
     def joints(self, piece: Index, fraction: Array) -> Array:
-        """Axis positions at fractions of pieces, (k, n_axes)."""
+        """(k, n_axes) axis positions at fractions (k,) of pieces (k,)."""
         return self.intent.joints(self.pieces.move[piece], self.segments.at(piece, fraction))
 
     @cached_property
     def programmed(self) -> Array:
-        """The axis positions of the program at the end of each piece, (m, n_axes) mm and rad."""
+        """(m, n_axes) programmed axis positions at the end of each piece, mm and rad."""
         return self.intent.joints_at(self.pieces.move, self.pieces.fraction)
 
     @property
     def done(self) -> Array:
-        """The axis positions at the end of each piece, (m, n_axes) mm and rad."""
+        """(m, n_axes) corrected axis positions at the end of each piece, mm and rad."""
         return self.ends[1]
 
     @cached_property
     def ends(self) -> tuple[Array, Array]:
-        """The axis positions where each piece starts and where it ends, (m, n_axes) mm and rad."""
+        """(m, n_axes) corrected axis positions at the start and at the end of each piece, mm and rad."""
         return self.intent.ends_of(self.pieces.move, self.segments)
 
     @cached_property
     def correction(self) -> Array:
-        """What is added to the axis positions of the program at the end of each piece, (m, n_axes) mm and rad."""
+        """(m, n_axes) corrected minus programmed axis positions at the end of each piece, mm and rad."""
         return self.done - self.programmed
 
 
 TURN_DEGREES = 360.0
 TURNED = 1e-12
-"""rad; a rotary axis that is so close to its number in the program stands there."""
+"""Difference, rad, up to which a rotary axis stands at its intended position."""
 
 
 @frozen
 class Known:
-    """Ends of motions, found by bringing the tip there on the exact model.
+    """Tip errors at the ends of motions, known from their correction on the exact model.
 
-    before  (n,) mm: how far off the tip is without correction; NaN where that is not known
-    end     (n, n_axes) commands at which it is where it should be, to 1 nm
-    beside  (n, n_axes) mm: how far axes that get no word are at most from where they should be on the way there; 0 for
-            all others. None: there are none
+    before  (n,) tip error without correction, mm; NaN if not known
+    end     (n, n_axes) commands at which the tip is where it should be, to 1 nm
+    beside  (n, n_axes) largest distance, mm, along the motion, of an axis that gets no word from where it should be; 0
+            for all other axes. None: there are no such axes
     """
 
     before: Array
@@ -117,10 +116,10 @@ class Known:
     beside: Array | None = None
 
     def at(self, written: WrittenPieces, piece: Index) -> tuple[Mask, Array, Array]:
-        """Which of these pieces (k,) end where errors are known, and these: before and after (k,) mm.
+        """(k,) whether the tip errors at the ends of pieces (k,) are known, and the errors before and after (k,), mm.
 
-        After a correction what is off is what the numbers that were written differ from those that were meant, as the
-        linear axes take the tip. The errors change on that way by less than a thousandth of it.
+        The error after the correction is the difference between written and meant commands, as the linear axes move the
+        tip by it. The errors of the machine change over this way by less than a thousandth of it.
         """
         intent, pieces = written.intent, written.pieces
         move = pieces.move[piece]
@@ -131,20 +130,23 @@ class Known:
         off = picked(pieces.end, piece) - picked(self.end, move)
         turned = greatest(np.abs(off[:, machine.rotary]))
         straight = (intent.moves.kind[move] != MotionKind.ARC) & (turned <= TURNED)
-        here = np.isfinite(before) & (pieces.fraction[piece] == 1) & straight
-        here[lacking(intent, move)] = False
+        known = np.isfinite(before) & (pieces.fraction[piece] == 1) & straight
+        known[lacking(intent, move)] = False
         shift = off[:, intent.columns] @ ways.T
-        return here, before, np.sqrt(np.einsum("ij,ij->i", shift, shift))
+        return known, before, np.sqrt(np.einsum("ij,ij->i", shift, shift))
 
 
 HeldAngle = Callable[[str, float, float, float], float]
-"""A rotary axis, its angle as programmed and as corrected, and one digit -> what the control may be told, degrees."""
+"""(axis letter, programmed angle, corrected angle, one digit) -> angle that may be written for the control, degrees."""
 
 
 def on_digits(intent: Intent, pieces: Pieces, among: Index | None = None, held: HeldAngle | None = None) -> Pieces:
-    """The pieces with rotary positions as they will be written; those that the program wrote stay as they are.
+    """The pieces with rotary positions rounded as they will be written, and X Y Z solved for them.
 
-    among  (k,) pieces that may have others; all if not given
+    Positions that are those of the program stay as they are.
+
+    among  (k,) the pieces to round; None: all
+    held   chooses the angle that may be written beyond 0 to 360 degrees, see `WrittenLanguage.held_angle`
     """
     machine, moves = intent.machine, intent.moves
     rows = _newly_written(moves, pieces, np.arange(len(pieces)) if among is None else among)
@@ -166,7 +168,7 @@ def on_digits(intent: Intent, pieces: Pieces, among: Index | None = None, held: 
 
 
 def _held(moves: Moves, programmed: Array, angles: Array, machine: Machine, held: HeldAngle) -> Array:
-    """Corrected angles (n, n_rotary), rad, as the control may be told them; `programmed`: without correction."""
+    """(n, n_rotary) corrected angles, rad, as they may be written; `programmed` (n, n_rotary): without correction."""
     digit = 10.0 ** -decimals_for(float(np.degrees(machine.least_increment[1])))
     letters = [axis for axis, turns in zip(moves.axes, moves.rotary, strict=True) if turns]
     told, nominal, found = np.degrees(angles), np.degrees(programmed), angles.copy()
@@ -179,21 +181,21 @@ def _held(moves: Moves, programmed: Array, angles: Array, machine: Machine, held
 
 
 def _newly_written(moves: Moves, pieces: Pieces, among: Index) -> Index:
-    """Straight pieces with a rotary position that the program does not have as a number of its own."""
+    """The straight pieces `among` (k,) with a rotary position that differs from that of the program."""
     turned = some((picked(pieces.end, among) != picked(moves.end, pieces.move[among]))[:, moves.rotary])
     return among[turned & ~pieces.unchanged[among] & ~pieces.arc[among]]
 
 
 def _rounded(angle: Array, machine: Machine) -> Array:
-    """Angles (rad) rounded to the decimals (of degrees) that the least increment needs."""
+    """Angles, rad, rounded to the decimals of degrees that the least increment needs."""
     decimals = decimals_for(float(np.degrees(machine.least_increment[1])))
     return np.radians(np.round(np.degrees(angle), decimals))
 
 
 def without_idle(moves: Moves, pieces: Pieces, emission: Emission, first: int = 0) -> Pieces:
-    """The pieces without those that do not move as they were written; the same object if there are none.
+    """The pieces without those that do not move once rounded; the same object if there are none.
 
-    first  the motion from which on pieces were written
+    first  the first motion whose pieces were written
     """
     if len(pieces) == len(moves):
         return pieces
@@ -204,15 +206,15 @@ def without_idle(moves: Moves, pieces: Pieces, emission: Emission, first: int = 
     chosen = pieces.rows(left)
     if pieces.share is None:
         return chosen
-    begins = np.append(0, left[:-1] + 1)  # the time of a piece goes to the next one that is left, of the same motion
+    begins = np.append(0, left[:-1] + 1)  # the time of a removed piece goes to the next piece of its motion
     return replace(chosen, share=np.add.reduceat(pieces.share, begins))
 
 
 def standing_still(pieces: Pieces, end: Array, start: Array, first: int = 0) -> Mask:
-    """(m,) straight pieces that another one of their motion can stand for: it goes on from where they begin.
+    """(m,) straight pieces that can be left out: they do not move, or the last piece of the motion, next, does not.
 
     end, start  (m, n_axes), (n, n_axes) commands at the ends of pieces and at the starts of motions, as written
-    first       the motion from which on pieces were written
+    first       the first motion whose pieces were written
     """
     found = np.zeros(len(pieces), dtype=bool)
     goes_on = pieces.move[1:] == pieces.move[:-1]
@@ -233,12 +235,12 @@ def standing_still(pieces: Pieces, end: Array, start: Array, first: int = 0) -> 
 
 
 CENTRE = 2.0
-"""Half steps by which a centre may be off in its plane: one that a radius says is within an output step of its place,
-and two words for it are within half a step each."""
+"""Largest shift of a centre in its plane by rounding, in half output steps: a centre given by a radius is within one
+step of its place; one given by two words, within half a step in each."""
 
 
 def rounding(machine: Machine) -> float:
-    """How far the tip may be off at the end of a motion because numbers are rounded: half a step in each axis, mm."""
+    """Largest tip error at the end of a motion by rounding, mm: half an output step in each linear axis."""
     half = 0.5 * machine.least_increment[0]
     ways = np.array([axis.direction for axis in machine.axes if not axis.rotary])
     if not len(ways):
@@ -248,10 +250,10 @@ def rounding(machine: Machine) -> float:
 
 
 def rounding_along(intent: Intent, pieces: Pieces, corners: float, own: Mask | None = None) -> float:
-    """How far the tip may be off along corrected motions because numbers are rounded, mm; 0 where there are none.
+    """Largest tip error along corrected motions by rounding, mm; 0 if there are none.
 
-    corners  what it may do at corners that the control offsets, in half output steps
-    own      (n,) motions that count; all if not given
+    corners  effect of rounding at corners that the control offsets, in half output steps
+    own      (n,) the motions to include; None: all
     """
     machine, moves = intent.machine, intent.moves
     rows = np.flatnonzero(~pieces.unchanged & (moves.kind != MotionKind.DWELL)[pieces.move])
@@ -265,21 +267,21 @@ def rounding_along(intent: Intent, pieces: Pieces, corners: float, own: Mask | N
 
 
 def rounding_of_arcs(machine: Machine, sweep: Array) -> float:
-    """How far the tip may be off along arcs that turn by `sweep` (k,) rad, mm: their ends and centres are rounded."""
+    """Largest tip error, mm, by rounding of ends and centres along arcs that turn by `sweep` (k,) rad."""
     half, bend = 0.5 * machine.least_increment[0], 1 - np.cos(np.minimum(np.abs(sweep), 2 * np.pi) / 2)
     in_plane = 2**0.5 + CENTRE * float(bend.max(initial=0.0))
     return max(half * float(np.hypot(in_plane, 1.0)), rounding(machine))
 
 
 def _turns(moves: Moves, pieces: Pieces, rows: Index) -> Array:
-    """By how much arcs among pieces turn, (k,) rad: each by its share of its motion."""
+    """(k,) the turn of arc pieces `rows`, rad: each piece's share of the sweep of its motion."""
     return moves.sweep[pieces.move[rows]] * (pieces.fraction[rows] - pieces.begun[rows])
 
 
 def _rounding_of_turns(intent: Intent, pieces: Pieces, rows: Index) -> float:
-    """What rounded rotary positions do between the ends of pieces `rows` (k,), mm.
+    """Largest tip error, mm, by rounding of rotary positions between the ends of pieces `rows` (k,).
 
-    Only without tool-centre-point control: with it the tip stays where it is while the axes turn.
+    It occurs only without tool-centre-point control: with it, the tip does not move with the rotary axes.
     """
     moves, rotary = intent.moves, intent.machine.rotary
     anew = some((picked(pieces.end, rows) != picked(moves.end, pieces.move[rows]))[:, rotary])
