@@ -1,12 +1,12 @@
-"""ncfix: knows how a particular machine tool is wrong, and makes it cut right.
+"""ncfix: corrects NC programs and compensation tables for the geometric errors of a machine tool.
 
     import ncfix
 
     machine = ncfix.load_machine("machine.toml")
     fixed = ncfix.fix("part.nc", machine, setup="part.setup.toml", output="part.fixed.nc")
 
-docs/api.md goes through the functions; `ncfix.api` says what holds for all of them. Nothing is imported before one of
-them is asked for.
+docs/api.md describes the functions; `ncfix.api` states what holds for all of them. A function's module is imported when
+it is first used.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ FUNCTIONS = {
     **dict.fromkeys(("plan", "calibrate", "diagnose"), "measurements"),
     **dict.fromkeys(("export", "emulate", "report"), "tables"),
 }
-"""Function -> the module of `ncfix.api` that has it."""
+"""Function -> the module of `ncfix.api` that defines it."""
 
 
 def __getattr__(name: str) -> Any:
-    """A function."""
+    """Import a function on first use."""
     if name not in FUNCTIONS:
         raise AttributeError(f"module 'ncfix' has no attribute {name!r}")
     from importlib import import_module

@@ -1,14 +1,14 @@
-"""The command `ncfix`, and `python -m ncfix`: nothing is imported before an interruption would be caught."""
+"""The command `ncfix`, and `python -m ncfix`; imports happen where an interruption is caught."""
 
 import gc
 import sys
 
 YOUNG = 100_000
-"""New objects after which Python looks for cycles among them; what is imported stays, and is most of a short run."""
+"""Number of new objects after which Python searches for cycles; in a short run most objects are imports, which stay."""
 
 
 def main() -> None:
-    """The console script; Ctrl-C while it starts ends it as it does later on."""
+    """Entry point of the console script; Ctrl-C during start-up ends it as it does later."""
     try:
         gc.set_threshold(YOUNG)
         from ncfix.cli.main import main as run

@@ -1,4 +1,4 @@
-"""The numbers and choices that functions take; the options of the command line take the same."""
+"""Ranges and choices of arguments, common to the functions of the API and the options of the command line."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from ncfix.values import frozen
 class NumberRange:
     """The finite numbers from `low` to `high`.
 
-    inside  neither end is one of them
-    whole   only integers
+    inside  whether `low` and `high` themselves are excluded
+    whole   whether only integers are allowed
     """
 
     low: float
@@ -25,7 +25,7 @@ class NumberRange:
     whole: bool = False
 
     def has(self, value: object) -> bool:
-        """Whether this is one of them; "not a number" is none."""
+        """Whether a value is in the range; NaN is not."""
         if not isinstance(value, (Integral if self.whole else Real)):
             return False
         number: Any = value
@@ -33,7 +33,7 @@ class NumberRange:
         return bool(within and number < math.inf)
 
     def check(self, name: str, value: object) -> None:
-        """Refuse another number, given under this name: `UsageError` NCF025."""
+        """Refuse a value outside the range, given for the argument `name`: `UsageError` NCF025."""
         if not self.has(value):
             number = "an integer" if self.whole else "a number"
             if self.low == -math.inf:
@@ -44,32 +44,32 @@ class NumberRange:
 
 
 def check_choice(name: str, value: object, known: Sequence[str]) -> None:
-    """Refuse what is none of the choices that there are: `UsageError` NCF025."""
+    """Refuse a value that is not one of the choices: `UsageError` NCF025."""
     if value not in known:
         raise UsageError.of("NCF025", f"{name}={value!r}", hint=f"one of {', '.join(known)}")
 
 
 OFFSET_AXES = tuple("XYZABCUVW")
-"""The axes that a set-up may name."""
+"""Axes that a setup may name."""
 FINITE = NumberRange(-math.inf, inside=True)
-"""Any number that is one."""
+"""Any finite number."""
 TOLERANCE_UM = NumberRange(0.01)
-"""No control has digits for a finer tolerance, and pieces without number would be sought for it."""
+"""Tolerance, um. Controls have no digits for a finer one, and motions would be split into very many pieces."""
 TARGET_UM = NumberRange(0.0, inside=True)
-"""How much correction may be lost between the points of a table."""
+"""Largest correction, um, that may be lost between the points of a table."""
 TOOL_LENGTH = NumberRange(0.0, 5000.0)
-"""mm: no tool is longer."""
+"""Tool length, mm."""
 FAULT = NumberRange(0.0, 1e6)
-"""How large each fault of a measurement is."""
+"""Size of an assumed fault of a measurement."""
 PRUNE = NumberRange(0.5, 1.0, inside=True)
-"""The significance that a coefficient must have to stay."""
+"""Significance that a coefficient needs in order to be kept."""
 KNOTS = NumberRange(0, whole=True)
 SEED = NumberRange(0, whole=True)
 POSES = NumberRange(1, whole=True)
-"""How many poses a plan has."""
+"""Number of poses of a plan."""
 BLOCK_NUMBERS = ("same", "none", "renumber")
-"""What becomes of block numbers; see `FixOptions`."""
+"""Treatment of block numbers; see `FixOptions`."""
 LOSSES = ("auto", "none", "huber", "tukey")
-"""What values far off count in a calibration."""
+"""Weighting of outlying values in a calibration."""
 PLANS = ("tcp", "tcp6", "probe", "length")
-"""The kinds of measurements that are planned."""
+"""Kinds of measurements that can be planned."""

@@ -1,8 +1,8 @@
-"""Text as people and spreadsheets save it: UTF-8, UTF-16 or Latin-1, with cells parted by commas, semicolons, tabs or
-blanks.
+"""Tables of cells in text files as people and spreadsheets save them: UTF-8, UTF-16 or Latin-1, separated by commas,
+semicolons, tabs or blanks.
 
-Where semicolons, tabs or blanks part the cells, numbers may have a decimal comma, as spreadsheets of many countries
-write them; then all of a file have it, since 1,234 is read as it stands.
+If the separator is not a comma, numbers may have a decimal comma, as spreadsheets of many countries write them; then
+all numbers of the file must have it, since 1,234 is taken as written.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import re
 from ncfix.values import frozen, mutable
 
 MARKS = ",;\t"
-"""What may part cells, besides blanks."""
+"""Possible separators of cells, besides blanks."""
 WORD = re.compile(r'"[^"]*"|\S+')
 OTHERS = {
     b"PK\x03\x04": ("a workbook of a spreadsheet", "save its sheet as CSV"),
@@ -23,11 +23,11 @@ OTHERS = {
     b"<": ("XML", "export it as text or CSV from the program that wrote it"),
     b"{": ("JSON", "export it as text or CSV from the program that wrote it"),
 }
-"""How files begin that hold no lines of cells: what they are, and what helps."""
+"""Beginnings of files of other formats -> what they are, and a hint."""
 
 
 def plain_text(source: bytes) -> str | None:
-    """The text of a file: UTF-16 by its mark or its zeros, else UTF-8, else Latin-1; None if it is none."""
+    """The text of a file in UTF-16, UTF-8 or Latin-1; None if it is no text."""
     try:
         if source.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
             found = source.decode("utf-16")
@@ -39,7 +39,7 @@ def plain_text(source: bytes) -> str | None:
 
 
 def _coding(beginning: bytes) -> str:
-    """The coding of a text without a mark of UTF-16: there the other byte of most letters is zero, and one never is."""
+    """The encoding of a text without a byte order mark; in UTF-16 one of the two bytes of most letters is zero."""
     zeros = beginning[0::2].count(0), beginning[1::2].count(0)
     if min(zeros) or max(zeros) * 4 <= len(beginning):
         return "utf-8-sig"
@@ -47,7 +47,7 @@ def _coding(beginning: bytes) -> str:
 
 
 def other_form(source: bytes) -> tuple[str, str]:
-    """What a file is that holds no lines of cells, and what helps; empty words for any other."""
+    """What a file of another format is, and a hint; empty for text."""
     start = source.removeprefix(codecs.BOM_UTF8).lstrip()
     return next((said for begin, said in OTHERS.items() if start.startswith(begin)), ("", ""))
 
@@ -63,10 +63,10 @@ class Cell:
 
 @mutable
 class SeparatedText:
-    """How the cells of a file are parted, and how its numbers are written.
+    """The separator and the decimal mark of a file.
 
-    mark     what parts the cells; " " for any number of blanks
-    decimal  the decimal mark of the first number that has one; "" before
+    mark     separator of cells; " " for any number of blanks
+    decimal  decimal mark of the first number that has one; "" before
     """
 
     mark: str
@@ -74,11 +74,11 @@ class SeparatedText:
 
     @classmethod
     def of(cls, names: str) -> SeparatedText:
-        """By the line with the names of the columns: a semicolon, tab or comma in it, else blanks, part the cells."""
+        """Separator found in the line with the column names: a semicolon, a tab or a comma, else blanks."""
         return cls(next((mark for mark in ";\t," if mark in names), " " if len(names.split()) > 1 else ","))
 
     def cells(self, row: str, line: int) -> list[Cell]:
-        """The cells of a row; blanks and a spreadsheet's quotes round a cell are taken off."""
+        """The cells of a row, without surrounding blanks and quotation marks."""
         if self.mark == " ":
             return [Cell(each[0].strip('"'), line, each.start() + 1) for each in WORD.finditer(row)]
         cells, column = [], 1
@@ -90,7 +90,7 @@ class SeparatedText:
         return cells
 
     def plain(self, text: str) -> str:
-        """A number with a decimal point. Raises ValueError for one that is not written as those before it."""
+        """A number with a decimal point. Raises ValueError if its decimal mark differs from that of earlier numbers."""
         found = "," if "," in text and self.mark != "," else "." if "." in text else ""
         if found and self.decimal and found != self.decimal:
             raise ValueError("decimal points and decimal commas in one file")

@@ -1,7 +1,7 @@
-"""What goes wrong, in plain words: coded errors with a place, the source line and one hint.
+"""Errors and messages: a code, plain words, a place with its source line, and one hint.
 
-Every failure that a user can cause is an `NcfixError` with a stable code. A fault of ncfix itself is never one: it
-stays an ordinary exception, and the command line reports it as a fault of ncfix (exit code 5).
+Every failure that a user can cause is an `NcfixError` with a stable code. A bug of ncfix is never one: it stays an
+ordinary exception, which the command line reports as a fault of ncfix (exit code 5).
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from ncfix.values import frozen, mutable
 
 @frozen
 class Code:
-    """What `ncfix explain` says about a message code: a title, what it means, and what to do about it.
+    """The explanation of a message code by `ncfix explain`: a title, its meaning, and what to do.
 
-    Every floor lists its own in `codes.py` as `CODES: dict[str, Code]`.
+    Packages list their codes in a `codes.py` as `CODES: dict[str, Code]`.
     """
 
     title: str
@@ -27,20 +27,20 @@ class Code:
 
 
 _BIDI = "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
-"""Characters that turn the direction of writing round, or end a line, and are not seen themselves."""
+"""Invisible characters that change the writing direction or end a line."""
 _UNSEEN = rf"\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f{_BIDI}\ud800-\udfff"
 _IN_A_LINE = re.compile(rf"[\t\n\r{_UNSEEN}]")
 _IN_LINES = re.compile(rf"\r\n?|[{_UNSEEN}]")
 EXCERPT = 100
-"""Characters of a source line that a message shows."""
+"""Number of characters of a source line that a message shows."""
 
 
 def visible(text: str, lines: bool = False) -> str:
-    """A text in which nothing steers a terminal: control characters as they are written in Python, `\\x1b` for one.
+    """The text without characters that could control a terminal; they are shown as Python escapes, such as `\\x1b`.
 
-    So are those that turn the direction of writing round, and bytes of a name that are no characters.
+    This includes characters that change the writing direction, and bytes of a file name that are no characters.
 
-    lines  the text has several lines, which may end in any way, and tabs
+    lines  whether the text may have several lines, with any line ends, and tabs
     """
     return (_IN_LINES if lines else _IN_A_LINE).sub(_escaped, text)
 
@@ -55,7 +55,7 @@ def _escaped(found: re.Match[str]) -> str:
 
 
 class ExitCode(IntEnum):
-    """Exit codes of the command line; over many files the worst one counts."""
+    """Exit codes of the command line; for several files the worst one is returned."""
 
     DONE = 0
     FINDINGS = 1
@@ -67,7 +67,7 @@ class ExitCode(IntEnum):
 
 @frozen
 class Place:
-    """Where in a file: path as the user wrote it, line and column from 1 (0 = the whole file), and that line's text."""
+    """A place in a file: path as the user wrote it, line and column from 1 (0: the whole file), and the line's text."""
 
     path: str
     line: int = 0
@@ -85,7 +85,7 @@ class Place:
 
 @frozen
 class Message:
-    """One coded remark: what is the matter, where, and what to do about it."""
+    """One coded message: what is wrong, where, and what to do about it."""
 
     code: str
     text: str
@@ -103,7 +103,7 @@ class Message:
 
     @property
     def advice(self) -> str:
-        """The hint; of a message without one of its own, where its code is explained."""
+        """The hint; for a message without one, how to get an explanation of its code."""
         return self.hint or f"ncfix explain {self.code} says more"
 
     def as_dict(self) -> dict[str, object]:
@@ -120,7 +120,7 @@ class Message:
 
 
 def _excerpt(text: str, column: int) -> list[str]:
-    """The part of a source line round a column (from 1, 0 for none), safe for a terminal, and a caret below it."""
+    """The part of a source line around a column (from 1; 0: none), safe for a terminal, with a caret below."""
     start = max(0, column - EXCERPT // 2) if len(text) > EXCERPT else 0
     part = text[start : start + EXCERPT]
     head, tail = "..." * (start > 0), "..." * (start + EXCERPT < len(text))
@@ -130,7 +130,7 @@ def _excerpt(text: str, column: int) -> list[str]:
 
 @mutable(eq=False, slots=False)
 class NcfixError(Exception):
-    """A failure with a remedy. `messages` holds coded remarks: one, or all that were found in a config file."""
+    """A failure with a remedy. `messages`: one message, or all that were found in a file."""
 
     messages: tuple[Message, ...]
     exit_code: ClassVar[ExitCode] = ExitCode.USAGE
@@ -155,37 +155,37 @@ class NcfixError(Exception):
 
 
 class UsageError(NcfixError):
-    """The command was asked for something it cannot do as asked (exit 2)."""
+    """The command or function cannot do what it was asked for (exit 2)."""
 
     exit_code = ExitCode.USAGE
 
 
 class DifferenceError(NcfixError):
-    """What was compared differs so much that there is nothing to measure (exit 1)."""
+    """Two compared things differ so much that no measure of the difference makes sense (exit 1)."""
 
     exit_code = ExitCode.FINDINGS
 
 
 class SourceError(NcfixError):
-    """An NC program that cannot be read or followed (exit 3)."""
+    """An NC program cannot be read or followed (exit 3)."""
 
     exit_code = ExitCode.UNREADABLE
 
 
 class ConfigError(NcfixError):
-    """A machine, setup or measurement file that is wrong (exit 3)."""
+    """A machine, setup or measurement file has errors (exit 3)."""
 
     exit_code = ExitCode.UNREADABLE
 
 
 class RefusedError(NcfixError):
-    """ncfix could go on, but the result might harm the part or the machine (exit 4)."""
+    """The result might harm the part or the machine (exit 4)."""
 
     exit_code = ExitCode.REFUSED
 
 
 class FaultError(NcfixError):
-    """ncfix itself failed (exit 5): what the command line makes of an exception that nobody foresaw."""
+    """A bug of ncfix (exit 5): made by the command line from an unexpected exception."""
 
     exit_code = ExitCode.FAULT
 

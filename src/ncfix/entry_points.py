@@ -1,7 +1,7 @@
-"""Entry points of the installed distributions, read from the folders in which installers put them.
+"""Entry points of installed distributions, read directly from their metadata folders.
 
-`importlib.metadata.entry_points` finds the same, but importing it takes as long as all else that `ncfix --help` does.
-It is asked where a distribution may be elsewhere than in a folder: in a zip file, an egg, or with a finder of its own.
+`importlib.metadata.entry_points` finds the same, but importing it doubles the time of `ncfix --help`. It is used only
+if distributions may be elsewhere: in a zip file, an egg, or with a finder of their own.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from typing import Any, Protocol
 from ncfix.values import frozen
 
 INFO = (".dist-info", ".egg-info")
-"""How the folder of a distribution ends."""
+"""Endings of a distribution's metadata folder."""
 METADATA = ("METADATA", "PKG-INFO", "")
-"""The files of such a folder that may say name and version; an egg-info may be that file itself."""
+"""Files in that folder that may give name and version; an egg-info may be that file itself."""
 PATH_FINDER = "_frozen_importlib_external"
-"""The module of Python's own finder, which looks into the folders of the path."""
+"""Module of Python's own finder, which searches the folders of the path."""
 
 
 class EntryPoint(Protocol):
-    """An entry point: its name, `module:object`, the distribution that it is of, or None, and what it leads to."""
+    """An entry point: name, value (`module:object`), distribution (or None), and the object it loads."""
 
     @property
     def name(self) -> str: ...  # noqa: D102
@@ -40,13 +40,13 @@ class EntryPoint(Protocol):
 
 @frozen
 class InstalledDistribution:
-    """A distribution, by its folder of metadata."""
+    """A distribution, given by its metadata folder."""
 
     folder: str
 
     @property
     def metadata(self) -> dict[str, str | None]:
-        """Name and version, None where nothing says them."""
+        """Name and version; None if not given."""
         found: dict[str, str | None] = {"Name": None, "Version": None}
         text = next((text for name in METADATA if (text := _text(os.path.join(self.folder, name).rstrip(os.sep)))), "")
         for line in text.splitlines():
@@ -68,7 +68,7 @@ class InstalledEntryPoint:
 
     @property
     def module(self) -> str:
-        """The module in which it is."""
+        """The module that it names."""
         return re.split(r"[:\[]", self.value, maxsplit=1)[0].strip()
 
     def load(self) -> Any:
@@ -78,7 +78,7 @@ class InstalledEntryPoint:
 
 
 def entry_points(group: str) -> list[EntryPoint]:
-    """The entry points of a group; of distributions of one name, the first one on the path counts."""
+    """The entry points of a group; of several distributions with the same name, the first on the path is used."""
     others = (finder for finder in sys.meta_path if getattr(finder, "__module__", "") != PATH_FINDER)
     if any(hasattr(finder, "find_distributions") for finder in others) or any(
         os.path.isfile(folder) or folder.endswith(".egg") for folder in sys.path
@@ -96,7 +96,7 @@ def entry_points(group: str) -> list[EntryPoint]:
 
 
 def _distributions(folder: str) -> list[str]:
-    """The names of all folders of metadata in a folder of the path."""
+    """Names of all metadata folders in a folder of the path."""
     try:
         return [name for name in os.listdir(folder or ".") if name.lower().endswith(INFO)]
     except OSError:
@@ -104,7 +104,7 @@ def _distributions(folder: str) -> list[str]:
 
 
 def _of_group(distribution: InstalledDistribution, group: str) -> Iterator[InstalledEntryPoint]:
-    """The entry points of a group that a distribution has."""
+    """The entry points of a distribution in a group."""
     section = ""
     for raw in _text(os.path.join(distribution.folder, "entry_points.txt")).splitlines():
         line = raw.strip()
@@ -116,7 +116,7 @@ def _of_group(distribution: InstalledDistribution, group: str) -> Iterator[Insta
 
 
 def _text(path: str) -> str:
-    """What stands in a file, nothing if it cannot be read."""
+    """The content of a file; empty if it cannot be read."""
     try:
         with open(path, encoding="utf-8", errors="replace") as file:
             return file.read()

@@ -1,11 +1,11 @@
-"""Files read and written with care: what is written is whole or not there, and where it was meant to be.
+"""Reads and writes files safely: an output is written completely or not at all, and only at its intended place.
 
-A new file is written without a name, where the system can do that, or else under another one beside its target; it is
-forced to the disk, and then given its name in one step. So a process that is killed leaves nothing, or a hidden
+A new file is written without a name if the system supports that, else under a temporary name beside its target. It is
+synchronised to disk, and then given its name in one step. So a killed process leaves nothing, or a hidden
 `.ncfix-*.tmp`, and never half an output.
 
-Below a folder that the user named, no symbolic link is followed: every folder on the way down is opened from the one
-above it, and what is written is written into the folder that is open, wherever its name may lead by then.
+Below a folder that the user named, symbolic links are not followed: each folder is opened from the one above it, and
+output is written into the opened folder, even if its name leads somewhere else by then.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ WRITING = {
     errno.ENAMETOOLONG: "a shorter name",
     errno.ENOTDIR: "another -o: a part of this path is a file",
 }
-"""What to do about what the system says."""
+"""Hints by error number of the system."""
 COPIED = 1 << 20
-"""Bytes that are copied at once."""
+"""Number of bytes copied at once."""
 COMPARED = 1000
-"""So many names of a folder are compared with one that is not there."""
+"""Largest number of names in a folder that are compared with a missing one."""
 PERMISSIONS = 0o777
-"""Bits of a mode that say who may read, write and run a file."""
+"""Bits of a mode for the rights to read, write and execute."""
 FOLDER = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0)
 UNKNOWN = frozenset(
     {
@@ -51,18 +51,18 @@ UNKNOWN = frozenset(
         *(errno.ENOENT, errno.EISDIR, errno.EINVAL, errno.EACCES),
     }
 )
-"""What systems and file systems say that have no links, no files without a name, or no way to name one."""
+"""Error numbers from systems and file systems that do not support links or unnamed files."""
 
 
 @frozen
 class WholeFile:
-    """All that stands in an open file."""
+    """The content of an open file."""
 
     handle: IO[bytes]
 
     @classmethod
     def of(cls, parts: Iterable[bytes], handle: IO[bytes]) -> WholeFile:
-        """Parts, put into an empty file as they come."""
+        """Write parts into an empty file as they come."""
         at = 0
         for part in parts:
             put_at(handle.fileno(), at, part)
@@ -76,7 +76,7 @@ class WholeFile:
 
 
 def read_bytes(path: str, most: int = inputs.MOST) -> bytes:
-    """The content of a file of at most so many bytes; raises `SourceError` NCF002."""
+    """The content of a file of at most `most` bytes; raises `SourceError` NCF002."""
     try:
         return inputs.taken(path, most)
     except OSError as error:
@@ -84,7 +84,7 @@ def read_bytes(path: str, most: int = inputs.MOST) -> bytes:
 
 
 def read_folder(folder: str) -> dict[str, bytes]:
-    """All files of a folder, by their names; raises `SourceError` NCF002."""
+    """Name -> content of all files in a folder; raises `SourceError` NCF002."""
     try:
         names = sorted(os.listdir(folder))
     except OSError as error:
@@ -94,12 +94,12 @@ def read_folder(folder: str) -> dict[str, bytes]:
 
 
 def unreadable(path: str, error: OSError) -> SourceError:
-    """The error NCF002 for what the system says of an input."""
+    """The error NCF002 for an input that the system cannot read."""
     return SourceError.of("NCF002", f"cannot be read: {error.strerror}", Place(path), reading_hint(path, error))
 
 
 def reading_hint(path: str, error: OSError) -> str:
-    """What to do about what the system says of an input: for a name that there is not, the nearest in its folder."""
+    """A hint for an input that cannot be read; for a missing file, the most similar name in its folder."""
     if error.errno == errno.ENOENT and path:
         from difflib import get_close_matches
 
@@ -113,13 +113,13 @@ def reading_hint(path: str, error: OSError) -> str:
 
 
 def unwritable(path: str, error: OSError) -> UsageError:
-    """The error NCF007 for what the system says of an output."""
+    """The error NCF007 for an output that the system cannot write."""
     hint = WRITING.get(error.errno or 0, "make room, or another -o")
     return UsageError.of("NCF007", f"cannot be written: {error.strerror}", Place(path), hint)
 
 
 def put_at(handle: int, at: int, data: bytes) -> None:
-    """Write into an open file, from a byte on."""
+    """Write `data` into an open file at byte `at`."""
     rest = memoryview(data)
     while rest:
         done = os.pwrite(handle, rest, at)
@@ -128,7 +128,7 @@ def put_at(handle: int, at: int, data: bytes) -> None:
 
 @contextmanager
 def said_of(path: str | None) -> Iterator[None]:
-    """What the system says of a file without a name is said of this path; None: of the folder for temporary files."""
+    """Add the name `path` to system errors of an unnamed file; None: the folder for temporary files."""
     try:
         yield
     except OSError as error:
@@ -140,9 +140,9 @@ def said_of(path: str | None) -> Iterator[None]:
 
 
 def unnamed(folder: str | None) -> IO[bytes]:
-    """A new file without a name, in a folder if it can be there: gone with this process unless it is given one.
+    """A new file without a name, in `folder` if possible; it disappears with this process unless it is given a name.
 
-    What is written into it is there at once, for all processes that have it open.
+    What is written to it is at once visible to all processes that have it open.
     """
     folder = folder if folder and os.path.isdir(folder) else None
     if folder and hasattr(os, "O_TMPFILE"):
@@ -168,7 +168,7 @@ def holds(path: str, data: bytes | Iterable[bytes]) -> bool:
 
 
 def mode_of(path: str) -> int | None:
-    """Who may read, write and run a file, as permission bits; None for what is no ordinary file."""
+    """Permission bits of a file; None if it is not an ordinary file."""
     try:
         found = os.stat(path)
     except OSError:
@@ -179,10 +179,10 @@ def mode_of(path: str) -> int | None:
 def write_whole(
     path: str, data: bytes | Iterable[bytes], replace: bool = False, root: str | None = None, mode: int | None = None
 ) -> None:
-    """Write a new file, or with `replace` in place of an existing one, whose owner and mode are kept.
+    """Write a new file; with `replace`, an existing one is replaced and its owner and mode are kept.
 
     root  as in `check_output`
-    mode  permission bits of a new file; None: those that new files get
+    mode  permission bits of a new file; None: the default
 
     Raises `UsageError` NCF004, NCF005, NCF007, NCF023.
     """
@@ -196,10 +196,10 @@ def write_whole(
 def write_folder(
     folder: str, contents: Mapping[str, bytes], replace: bool = False, inputs: Collection[FileIdentity] = ()
 ) -> None:
-    """Write all files of a folder, or none if one is there already or must not be, or there is no room.
+    """Write all files of a folder, or none if one of them exists, must not be written, or there is no space.
 
-    contents  name of a file -> what is in it
-    inputs    files that are not replaced in any case
+    contents  file name -> content
+    inputs    files that are never replaced
 
     Raises `UsageError` NCF003, NCF004, NCF005, NCF007, NCF023.
     """
@@ -219,7 +219,7 @@ def write_folder(
 
 
 def replace_keeping(path: str, backup: str, data: bytes | Iterable[bytes]) -> None:
-    """Give `path` new content and keep the old file as `backup`; at every moment both names hold whole files."""
+    """Give `path` new content and keep the old file as `backup`; at every moment both names refer to complete files."""
     check_output(path)
     with _coded(path), _folder(path, None) as (folder, name):
         second = os.path.basename(backup)
@@ -236,7 +236,7 @@ def replace_keeping(path: str, backup: str, data: bytes | Iterable[bytes]) -> No
 
 
 def append(path: str, data: bytes) -> None:
-    """Write on at the end of a file of ncfix's own, to the disk. Raises `UsageError` NCF005, NCF007."""
+    """Append to a file that ncfix itself owns, and synchronise it. Raises `UsageError` NCF005, NCF007."""
     check_own(path)
     with _coded(path):
         os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
@@ -264,7 +264,7 @@ def _coded(path: str) -> Iterator[None]:
 
 @contextmanager
 def _folder(path: str, root: str | None) -> Iterator[tuple[int, str]]:
-    """The folder of an output, opened, and the output's name in it; folders that are missing are made."""
+    """Open the folder of an output and yield it with the output's name in it; missing folders are created."""
     top, way = way_to(path, root)
     *folders, name = way.split(os.sep)
     os.makedirs(top or ".", exist_ok=True)
@@ -284,7 +284,7 @@ def _folder(path: str, root: str | None) -> Iterator[tuple[int, str]]:
 
 
 def _as_it_is(name: str, folder: int) -> os.stat_result | None:
-    """What the system says of a file in a folder; None if there is none."""
+    """Status of a file in a folder; None if there is none."""
     try:
         return os.stat(name, dir_fd=folder, follow_symlinks=False)
     except FileNotFoundError:
@@ -295,11 +295,11 @@ def _as_it_is(name: str, folder: int) -> os.stat_result | None:
 
 
 Like = os.stat_result | int | None
-"""Whose owner and mode a file gets, or which permission bits; None: those of new files."""
+"""File whose owner and mode a new file gets, or permission bits; None: defaults."""
 
 
 def _put(folder: int, name: str, data: bytes | Iterable[bytes], like: Like, replace: bool) -> None:
-    """A file with this content, on the disk, under a name in a folder."""
+    """Write a file with this content to disk under a name in a folder."""
     with _without_a_name(folder, data, like) as handle:
         if handle is not None and not replace and _named(handle, name, folder):
             return
@@ -310,7 +310,7 @@ def _put(folder: int, name: str, data: bytes | Iterable[bytes], like: Like, repl
 
 @contextmanager
 def _without_a_name(folder: int, data: bytes | Iterable[bytes], like: Like) -> Iterator[int | None]:
-    """A file with this content and no name, on the disk; None where there is no such thing."""
+    """A file on disk with this content and no name; None if the system has no such files."""
     handle = os.dup(data.handle.fileno()) if isinstance(data, WholeFile) else _new_without_a_name(folder)
     if handle is None:
         yield None
@@ -339,9 +339,9 @@ def _new_without_a_name(folder: int) -> int | None:
 def _written_beside(
     folder: int, data: bytes | Iterable[bytes], like: Like, unnamed: int | None = None
 ) -> Iterator[str]:
-    """A file with this content, on the disk, in a folder; gone afterwards if it still has its own name.
+    """A file on disk with this content, under a temporary name in a folder; removed if it still has that name.
 
-    unnamed  a file with this content, owner and mode that has no name yet
+    unnamed  an unnamed file with this content, owner and mode
     """
     temporary = f".ncfix-{os.urandom(8).hex()}.tmp"
     try:
@@ -367,7 +367,7 @@ def _fill(handle: int, data: bytes | Iterable[bytes]) -> None:
 
 
 def _parts(handle: int) -> Iterator[bytes]:
-    """What stands in an open file."""
+    """The content of an open file, in parts."""
     at = 0
     while part := os.pread(handle, COPIED, at):
         yield part
@@ -375,7 +375,7 @@ def _parts(handle: int) -> Iterator[bytes]:
 
 
 def _named(handle: int, name: str, folder: int) -> bool:
-    """Give a file without a name this one, which must be free; False where the system cannot do that."""
+    """Give an unnamed file a name, which must be free; returns False if the system cannot do that."""
     try:
         os.link(f"/proc/self/fd/{handle}", name, src_dir_fd=folder, dst_dir_fd=folder)  # else it would not be followed
     except FileExistsError:
@@ -388,7 +388,7 @@ def _named(handle: int, name: str, folder: int) -> bool:
 
 
 def _make_like(handle: int, like: Like) -> None:
-    """Give a new file the owner and the mode of another, or a mode."""
+    """Give a new file the owner and mode of another file, or a mode."""
     if isinstance(like, int):
         os.chmod(handle, like)
     elif like is not None:
@@ -399,7 +399,7 @@ def _make_like(handle: int, like: Like) -> None:
 
 
 def _link(old: str, new: str, folder: int) -> bool:
-    """Give a file of a folder a second name there, which must be free; False where there is no such thing."""
+    """Give a file in a folder a second name there, which must be free; returns False if links are not supported."""
     try:
         os.link(old, new, src_dir_fd=folder, dst_dir_fd=folder, follow_symlinks=False)
     except FileExistsError:
@@ -412,7 +412,7 @@ def _link(old: str, new: str, folder: int) -> bool:
 
 
 def _sync(folder: int) -> None:
-    """Make the new name last through a power cut, where the file system can."""
+    """Synchronise the folder, so that a new name survives a power cut, if the file system supports that."""
     try:
         os.fsync(folder)
     except OSError as error:

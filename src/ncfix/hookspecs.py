@@ -1,9 +1,9 @@
-"""The whole extension contract: what a plugin may add to ncfix.
+"""The extension contract: everything that a plugin can add to ncfix.
 
-A plugin is a module (or object) that an entry point of the group `ncfix` names, with functions of these names marked
-`@ncfix.hookspecs.hookimpl`. Every hook gets a `register` function and calls it once for each thing that it brings:
-`register(thing)` files it under `thing.name`, `register(thing, name="...")` under that name. A name may be taken once.
-Hooks are called once, when ncfix first needs any plugin: they should be cheap, and import what is slow inside the
+A plugin is a module (or object) named by an entry point of the group `ncfix`. It has functions with the names below,
+marked `@ncfix.hookspecs.hookimpl`. Each hook gets a function `register` and calls it once for each thing it adds:
+`register(thing)` uses the name `thing.name`, `register(thing, name="...")` the given name. Each name can be registered
+once. Hooks are called once, when ncfix first needs any plugin: they should be fast, and slow imports belong inside the
 things that they register. docs/plugins.md shows a plugin in 15 lines.
 """
 
@@ -37,15 +37,15 @@ Thing = TypeVar("Thing", contravariant=True)
 
 
 class Register(Protocol[Thing]):
-    """Files a thing under its name; raises `PluginError`: NCF503 if the name is taken, NCF505 without a name."""
+    """Registers a thing under its name; raises `PluginError`: NCF503 if the name is taken, NCF505 without a name."""
 
     def __call__(self, thing: Thing, name: str | None = None) -> None:
-        """File `thing` under `name`, or under `thing.name`."""
+        """Register `thing` under `name`, or under `thing.name`."""
 
 
 @hookspec
 def register_dialects(register: Register[Dialect]) -> None:
-    """Controls' languages for `--dialect`: a `Dialect` names its grammar, its file suffixes and its limits."""
+    """Languages of controls, for `--dialect`: a `Dialect` names its grammar, file suffixes and limits."""
 
 
 @hookspec
@@ -65,24 +65,24 @@ def register_effects(register: Register[PluginEffect]) -> None:
 
 @hookspec
 def register_readers(register: Register[Callable[[str, str], Measurement | None]]) -> None:
-    """Readers of instruments' own files: `reader(text, path)` is the measurement in them, None if it knows them not."""
+    """Readers of instrument files: `reader(text, path)` returns the measurement, or None for a file of another kind."""
 
 
 @hookspec
 def register_controls(register: Register[Callable[[], Control]]) -> None:
-    """Controls with compensation tables of their own: functions that return a `Control`; register them with a name."""
+    """Controls with their own compensation tables: functions that return a `Control`, registered with a name."""
 
 
 @hookspec
 def register_reporters(register: Register[Callable[[Document], bytes]]) -> None:
-    """Forms of a report: `form(document)` is the content of a file; register it with the file's suffix as its name."""
+    """Report formats: `form(document)` returns the content of a file; registered with the file suffix as name."""
 
 
 @hookspec
 def register_commands(register: Register[click.Command]) -> None:
-    """Verbs of the command line; a built-in verb cannot be replaced."""
+    """Commands of the command line; a built-in one cannot be replaced."""
 
 
 @hookspec
 def register_executors(register: Register[Callable[[int], Executor]]) -> None:
-    """Where batches run: `factory(workers) -> concurrent.futures.Executor`; register it with a name."""
+    """Executors for batches: `factory(workers) -> concurrent.futures.Executor`, registered with a name."""

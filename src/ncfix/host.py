@@ -1,10 +1,9 @@
-"""The computer that ncfix runs on: its processors, where it keeps what can be made again, processes that end together,
-limits of time and memory.
+"""The computer ncfix runs on: processors, cache folders, child processes that end with their parent, limits of time and
+memory.
 
-A process that is killed cannot end others. So those that it starts look after themselves, and none works on, or holds a
-pipe open, when the one that started it is gone, whatever ended that one: the kernel of Linux is asked to kill them
-(`prctl`), also while they are deep in compiled code; and anywhere a thread waits for the far end of a pipe that closes
-then, which multiprocessing keeps for that.
+A killed process cannot end its children. So each child watches its parent, and neither continues nor keeps a pipe open
+after the parent is gone, for whatever reason. On Linux the kernel is asked to kill it (`prctl`), which also works
+during compiled code; on all systems a thread waits for a pipe of multiprocessing that closes when the parent ends.
 """
 
 from __future__ import annotations
@@ -20,16 +19,16 @@ from ncfix.diagnostics import FaultError
 
 
 def processors() -> int:
-    """So many may run this process, whether they are free or not."""
+    """Number of processors that this process may use, busy or not."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def cache_folders(source: str) -> Iterator[Path]:
-    """Beside what Python keeps of a module, by its file; then the user's own cache, if there is a home for it.
+    """Folders for data that can be recomputed: beside a module's compiled file, then the user's cache, if any.
 
-    They need not be there, nor be such that they can be written to.
+    They need not exist or be writable.
     """
     yield Path(source).parent / "__pycache__"
     with suppress(RuntimeError):  # no HOME, and a user whom the system does not know
@@ -37,14 +36,14 @@ def cache_folders(source: str) -> Iterator[Path]:
 
 
 GONE = 1
-"""Exit code of a process that ends because the one that started it has."""
+"""Exit code of a process that ends because its parent has ended."""
 PR_SET_PDEATHSIG = 1
-"""Linux, `prctl(2)`: the signal that a process gets when the thread that started it ends."""
+"""Linux, `prctl(2)`: set the signal that a process gets when its parent thread ends."""
 SIGKILL = 9
 
 
 def tie() -> None:
-    """Tie this process to the one that started it by multiprocessing, whose starting thread waits for it to end."""
+    """Make this process, if multiprocessing started it, end with its parent; the thread that started it must wait."""
     from multiprocessing import parent_process
 
     parent = parent_process()
@@ -64,20 +63,20 @@ def tie() -> None:
 
 
 class TimeIsUpError(BaseException):
-    """What is done has taken its time: an exception that no handler of errors on the way takes for its own."""
+    """The time limit is over. Not an `Exception`, so that handlers of errors on the way do not catch it."""
 
 
 GRACE_S = 10.0
-"""A process that was tied to another and does not end its work so long after its time is killed."""
+"""Time, s, after its limit at which a child process that has not ended is killed."""
 
 
 @contextmanager
 def limited(seconds: float | None, megabytes: int | None) -> Iterator[None]:
-    """Do something in so much time and memory, in the main thread; None: without limit.
+    """Context with limits of time and memory, in the main thread; None: no limit.
 
-    megabytes  of data of this process; with more a `MemoryError` is raised
+    megabytes  size of this process's data; beyond it a `MemoryError` is raised
 
-    Raises `FaultError` NCF030 when the time is over. Where the system has no such limits there are none.
+    Raises `FaultError` NCF030 when the time is over. On systems without such limits there are none.
     """
     with _in_memory(megabytes), _in_time(seconds):
         yield
@@ -109,7 +108,7 @@ def _in_time(seconds: float | None) -> Iterator[None]:
 
 
 def _backstop(seconds: float) -> Timer:
-    """Kill this process after a time, if it is one that another has started, unless that is taken back."""
+    """Start a timer that kills this process, if it is a child process; cancelling the timer prevents it."""
     from multiprocessing import parent_process
 
     timer = Timer(seconds, (lambda: os._exit(GONE)) if parent_process() else lambda: None)

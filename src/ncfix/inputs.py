@@ -1,8 +1,8 @@
-"""Inputs opened and read without surprise: what has no end is refused, and nobody is waited for who does not come.
+"""Opens and reads inputs safely: endless inputs are refused, and pipes without a writer are not waited for.
 
-Ordinary files are read, and pipes: standard input, those that a shell makes for `<(...)`, and those with a name as soon
-as somebody writes into them. A device has no end that is worth waiting for, but for the one that is always empty. What
-is read as a whole, and what comes through a pipe, may have so many bytes; a file that is read in parts any number.
+Accepted are ordinary files and pipes: standard input, those of a shell's `<(...)`, and named pipes as soon as a writer
+opens them. Devices are refused, except the null device. Inputs read as a whole, and pipes, are limited in size; files
+that are read in parts are not.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from typing import IO
 from ncfix.diagnostics import Place, UsageError
 
 MOST = 1 << 30
-"""Bytes of a program or a measurement that is read as a whole, or comes through a pipe: some ten million blocks."""
+"""Largest number of bytes of a program or a measurement read as a whole or through a pipe: some ten million blocks."""
 MOST_SAID = 1 << 26
-"""Bytes of what people write: machine files, set-ups, tool tables."""
+"""Largest number of bytes of files that people write: machine files, setups, tool tables."""
 AT_ONCE = 1 << 20
-"""Bytes of a pipe that are read at once."""
+"""Number of bytes read from a pipe at once."""
 WAIT_S = 5.0
-"""How long somebody is waited for who opens the other end of a pipe with a name."""
+"""Time, s, to wait for a writer of a named pipe."""
 OWN = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")
-"""How the paths of files begin that this process has open."""
+"""Beginnings of paths that name files which this process has open."""
 
 
 def opened(path: str) -> IO[bytes]:
-    """A file, open to be read. Raises OSError, in the words of the system or in plain ones."""
+    """Open a file for reading. Raises OSError with the words of the system or plain ones."""
     found = os.stat(path)
     own = path.startswith(OWN)
     if stat.S_ISFIFO(found.st_mode) and not own:
@@ -46,9 +46,9 @@ def opened(path: str) -> IO[bytes]:
 
 
 def check(handle: IO[bytes], own: bool = True) -> None:
-    """Raise OSError if an open file is a device that nobody sits at, or the like.
+    """Raise OSError if an open file is a device or a socket.
 
-    own  it may be the terminal at which this process was started
+    own  whether the terminal of this process is allowed
     """
     try:
         number = handle.fileno()
@@ -58,7 +58,7 @@ def check(handle: IO[bytes], own: bool = True) -> None:
 
 
 def content(handle: IO[bytes], most: int = MOST) -> bytes:
-    """All that is left of an open file. Raises OSError if that is more than `most` bytes."""
+    """The remaining content of an open file. Raises OSError if it is more than `most` bytes."""
     size = AT_ONCE
     if (known := _size(handle)) is not None:
         check_size(known, most)
@@ -72,23 +72,23 @@ def content(handle: IO[bytes], most: int = MOST) -> bytes:
 
 
 def check_size(count: int, most: int = MOST) -> None:
-    """Raise OSError if something has more than so many bytes."""
+    """Raise OSError if `count` bytes are more than `most`."""
     if count > most:
         raise OSError(errno.EFBIG, f"it has more than {most >> 20} MB")
 
 
 def taken(path: str, most: int = MOST) -> bytes:
-    """The content of a file. Raises OSError, in the words of the system or in plain ones."""
+    """The content of a file. Raises OSError with the words of the system or plain ones."""
     with opened(path) as handle:
         return content(handle, most)
 
 
 FileIdentity = tuple[int, int]
-"""Device and number of a file, whatever it is called."""
+"""Device and inode number, which identify a file under any name."""
 
 
 def identity(path: str) -> FileIdentity | None:
-    """Which file is behind a name; None if there is none."""
+    """The identity of the file with a name; None if there is none."""
     try:
         found = os.stat(path)
     except (OSError, ValueError):
@@ -97,14 +97,14 @@ def identity(path: str) -> FileIdentity | None:
 
 
 def identities(paths: Iterable[str]) -> frozenset[FileIdentity]:
-    """The files behind these names, however they are called."""
+    """The identities of the files with these names."""
     return frozenset(found for found in map(identity, paths) if found is not None)
 
 
 def each_once(given: Iterable[str], shown: Callable[[str], str] = str) -> None:
-    """Refuse a file that is named twice, under whatever names: `UsageError` NCF020.
+    """Refuse a file that is given twice, even under different names: `UsageError` NCF020.
 
-    shown  how messages name it
+    shown  path -> its name in messages
     """
     seen: set[object] = set()
     for path in given:
@@ -115,13 +115,13 @@ def each_once(given: Iterable[str], shown: Callable[[str], str] = str) -> None:
 
 
 def given_twice(path: str) -> UsageError:
-    """The error NCF020 for an input that is there twice: what it says would count twice."""
+    """The error NCF020 for an input that is given twice and would count twice."""
     text = "is given twice, and what it says would count twice"
     return UsageError.of("NCF020", text, Place(path), "leave it out once")
 
 
 def _size(handle: IO[bytes]) -> int | None:
-    """Bytes of an ordinary file; None of anything else."""
+    """Number of bytes of an ordinary file; None for anything else."""
     with suppress(OSError):
         found = os.fstat(handle.fileno())
         return found.st_size if stat.S_ISREG(found.st_mode) else None
@@ -137,7 +137,7 @@ def _check(found: os.stat_result, terminal: bool) -> None:
 
 
 def _pipe(path: str) -> int:
-    """A pipe with a name, open as soon as somebody writes into it; raises OSError if nobody does."""
+    """Open a named pipe; raises OSError if no writer opens it in time."""
     found: list[int | OSError] = []
 
     def wait() -> None:

@@ -1,9 +1,9 @@
-"""Which outputs may be written: under what name, through which folders, in whose place. Nothing is written here.
+"""Checks whether outputs may be written: names, folders on the way, files that would be replaced. Writes nothing.
 
-Controls run Windows, and programs go to them on sticks and shares. What is written under a name that Windows takes for
-something else is lost there, or lands where nobody meant it: `CON` is the console whatever its suffix, a full stop or a
-blank at the end is dropped, `\\` and `:` begin a folder, a disk or a hidden stream. So no output gets such a name, on
-any system. The names that Windows keeps for devices are listed in Microsoft's "Naming Files, Paths, and Namespaces".
+Controls run Windows, and programs reach them on USB sticks and network shares. A name with a special meaning on Windows
+is lost there, or leads elsewhere: `CON` is the console with any suffix, a final full stop or blank is dropped, `\\` and
+`:` begin a folder, a drive or a hidden stream. So no output gets such a name, on any system. Source: Microsoft, "Naming
+Files, Paths, and Namespaces".
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ def check_target(
     root: str | None = None,
     resume: bool = False,
 ) -> None:
-    """Refuse an output that must not be written, as long as nothing has been computed.
+    """Refuse an output that must not be written; to be called before anything is computed.
 
-    inputs   files that are read, and not replaced in any case
-    replace  an existing output may be replaced
+    inputs   files that are read, and so never replaced
+    replace  whether an existing output may be replaced
     root     as in `check_output`
-    resume   an existing output is left as it is
+    resume   whether an existing output is accepted and left unchanged
 
     Raises `UsageError` NCF003, NCF004, NCF005, NCF007, NCF023.
     """
@@ -50,12 +50,12 @@ def check_target(
 
 
 def exists_already(path: str) -> UsageError:
-    """The error NCF004."""
+    """The error NCF004: the output exists already."""
     return UsageError.of("NCF004", "exists already", Place(path), "--force replaces an output")
 
 
 def check_name(way: str, path: str) -> None:
-    """Refuse a way down from an output folder, or the name of a file, that cannot be carried: NCF023.
+    """Refuse a path below an output folder, or a file name, that is not allowed: NCF023.
 
     path  the output, for the message
     """
@@ -67,12 +67,12 @@ def check_name(way: str, path: str) -> None:
 
 
 def folded_name(path: str) -> str:
-    """A name without what some file systems do not tell apart: case, and composed letters."""
+    """A name in the form in which file systems may compare it: without case, and with composed letters."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", path).casefold())
 
 
 def check_ordinary(path: str) -> None:
-    """Refuse an output that is there and is a symbolic link, a folder or a device: NCF005."""
+    """Refuse an existing output that is a symbolic link, a folder or a device: NCF005."""
     if os.path.islink(path):
         hint = f"name the file itself: {os.path.realpath(path)}"
         raise UsageError.of("NCF005", "is a symbolic link, which is not written through", Place(path), hint)
@@ -81,9 +81,9 @@ def check_ordinary(path: str) -> None:
 
 
 def check_output(path: str, root: str | None = None, replace: bool = False) -> None:
-    """Refuse an output that must not be written: under a name that cannot be carried, or through a link.
+    """Refuse an output whose name is not allowed, or that would be written through a symbolic link.
 
-    root  the folder that the user named, if the way from there is that of an input: none of its folders may be a link
+    root  the folder named by the user, if the path below it is that of an input: none of its folders may be a link
 
     Raises `UsageError` NCF005, NCF023.
     """
@@ -102,13 +102,13 @@ def check_output(path: str, root: str | None = None, replace: bool = False) -> N
 
 
 def check_named(path: str | None) -> None:
-    """Refuse an empty name: `UsageError` NCF003; None is no name."""
+    """Refuse an empty name: `UsageError` NCF003; None is accepted."""
     if path == "":
         raise UsageError.of("NCF003", "the name of the output is empty", hint="-o FILE, -o DIR or -o -")
 
 
 def check_folder(folder: str) -> None:
-    """Refuse what cannot be a folder of several files: NCF003, or NCF007 for what is there and is none."""
+    """Refuse an output folder with an invalid name (NCF003), or one that exists and is not a folder (NCF007)."""
     if folder in ("", "-"):
         raise UsageError.of("NCF003", "tables are several files, which go to a folder", hint="-o FOLDER")
     if os.path.lexists(folder) and not os.path.isdir(folder):
@@ -116,7 +116,7 @@ def check_folder(folder: str) -> None:
 
 
 def check_own(path: str) -> None:
-    """Refuse to write on in what is no file of ncfix's own: a link, a device, a file with another name, too. NCF005."""
+    """Refuse to append to a file that is not ncfix's own: a link, a device, or a file with a second name. NCF005."""
     check_ordinary(path)
     with suppress(FileNotFoundError):
         if os.stat(path).st_nlink != 1:
@@ -124,20 +124,20 @@ def check_own(path: str) -> None:
 
 
 def way_to(path: str, root: str | None) -> tuple[str, str]:
-    """The folder that the user named, and the way from there."""
+    """The folder that the user named, and the path below it."""
     if root is None:
         return os.path.dirname(path), os.path.basename(path)
     return root, os.path.relpath(path, root)
 
 
 def linked(path: str) -> UsageError:
-    """The error NCF005 for a folder below the output folder that is a symbolic link."""
+    """The error NCF005 for a symbolic link among the folders below the output folder."""
     hint = "take the link away, or another -o"
     return UsageError.of("NCF005", "is a symbolic link, and leads out of the output folder", Place(path), hint)
 
 
 def _name_problem(name: str) -> str:
-    """What is the matter with a name; empty if nothing is."""
+    """What is wrong with a name, in words; empty if nothing is."""
     if name in ("", os.curdir):
         return "has an empty name in it"
     if name == os.pardir:
@@ -155,9 +155,9 @@ def _name_problem(name: str) -> str:
 
 
 def _link_on_the_way(folder: str) -> str:
-    """The first symbolic link among the folders that the user named; empty if there is none.
+    """The first symbolic link in the path of a folder that the user named; empty if there is none.
 
-    Links at the root of the file system, as `/tmp` of macOS, are the system's own.
+    Links at the root of the file system, such as `/tmp` on macOS, belong to the system and are ignored.
     """
     parts = folder.split(os.sep)
     for count in range(3 if os.path.isabs(folder) else 1, len(parts) + 1):

@@ -1,4 +1,4 @@
-"""What a plugin imports: all that a maker's language and tables need, in one module.
+"""The module that plugins import: everything that a maker's language and tables need.
 
     from ncfix.plugin import CycleTable, Rapid, SetTool, family, hookimpl
 
@@ -8,9 +8,9 @@
     def register_dialects(register):
         register(BROTHER)
 
-Names are looked up when they are asked for: what is light (dialects, operations, hooks) costs nothing, what needs numpy
-(tables, machines) is imported with the first of them. So a plugin's first module asks for light names only, and has its
-tables in a module of its own. docs/plugins.md goes through it step by step; `ncfix.testing` judges the result.
+Names are imported on first use. Dialects, operations and hooks import quickly; tables and machines import numpy. So a
+plugin's first module should use only the former, and have its tables in a module of its own. docs/plugins.md explains
+it step by step; `ncfix.testing` tests the result.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ ELSEWHERE = {
     "ncfix.tables.lower_bounds": ("least_of_own_axis",),
     "ncfix.tables.table_files": ("Remarks", "as_number", "check_all", "in_order", "messages_of", "unit_of"),
 }
-"""Module -> the names that are imported from it when they are asked for."""
+"""Module -> names that are imported from it on first use."""
 
 MODULES = {name: module for module, names in ELSEWHERE.items() for name in names}
 
@@ -130,7 +130,7 @@ __all__ = sorted((*HERE, *MODULES))
 
 
 def made_by(name: str) -> Callable[[], Any]:
-    """A function that calls another, or a class, `module:name`, whose module is imported only then."""
+    """A function that calls the function or class `module:name`, whose module is imported only then."""
 
     def made() -> Any:
         from pkgutil import resolve_name
@@ -145,7 +145,7 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    """A name of another module."""
+    """Import a name on first use."""
     if name not in MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     found = globals()[name] = getattr(import_module(MODULES[name]), name)
@@ -154,9 +154,9 @@ def __getattr__(name: str) -> Any:
 
 @cache
 def family(name: str) -> Dialect:
-    """The dialect of that name of an installed plugin, to derive another from it.
+    """The dialect `name` of an installed plugin, from which another can be derived.
 
-    Raises LookupError where there is none.
+    Raises LookupError if there is none.
     """
     found: dict[str, Dialect] = {}
 

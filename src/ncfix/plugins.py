@@ -1,13 +1,12 @@
-"""Loading of plugins, one by one, whole or not at all; and whose fault it is when one of them fails.
+"""Loads plugins, each completely or not at all, and finds the plugin that is responsible for a failure.
 
-A plugin that cannot be imported, has a hook that ncfix does not know, raises while it registers, or takes a name that
-is taken, is left out with everything it had registered so far; a `PluginWarning` names it. With
-`NCFIX_STRICT_PLUGINS=1` it is an error instead. `NCFIX_DISABLE_PLUGINS=name,name` leaves plugins out unloaded, by
-entry point or distribution.
+A plugin is left out completely if it cannot be imported, has a hook that ncfix does not know, raises while registering,
+or registers a name that is taken; a `PluginWarning` names it. With `NCFIX_STRICT_PLUGINS=1` it is an error instead.
+`NCFIX_DISABLE_PLUGINS=name,name` leaves plugins out without loading them, by entry point or distribution.
 
-Whatever a plugin brings is called through `called`, or stands in the traceback of what it raised (`blamed`, which the
-command line asks before it owns up to a fault of ncfix). Errors with a code pass: they are told as they are. So do
-faults of what ncfix itself brings, which comes in as plugins do: those are faults of ncfix.
+Code of a plugin is called through `called`, or appears in the traceback of an exception (`blamed`, which the command
+line asks before it reports a fault of ncfix). Errors with a code are passed on unchanged. So are exceptions from
+ncfix's own plugins: those are faults of ncfix.
 """
 
 from __future__ import annotations
@@ -31,19 +30,19 @@ from ncfix.entry_points import EntryPoint, entry_points
 from ncfix.values import frozen
 
 hookspecs = import_module("ncfix.hookspecs")
-"""The contract speaks of things of all floors, so it stands above them, and the ground takes it by its name."""
+"""Loaded by name, because the contract refers to all packages and so is above this module."""
 GROUP: str = hookspecs.GROUP
 HOOKS = tuple(sorted(name for name in vars(hookspecs) if name.startswith("register_")))
 
 KINDS = tuple(hook.removeprefix("register_") for hook in HOOKS)
-"""What can be registered, one kind a hook: "dialects", "bases", ..."""
+"""The kinds of things that can be registered, one per hook: "dialects", "bases", ..."""
 
 Things = Mapping[str, Mapping[str, Any]]
 """Kind -> name -> thing."""
 
 
 class PluginWarning(UserWarning):
-    """A plugin was left out, or something of it; `message` says which and why."""
+    """A plugin, or something that it registered, was left out; `message` tells which and why."""
 
     def __init__(self, message: Message) -> None:
         super().__init__(str(message))
@@ -52,7 +51,7 @@ class PluginWarning(UserWarning):
 
 @frozen
 class Plugin:
-    """A plugin that is in: its entry point's name, where it comes from, and what it registered."""
+    """A loaded plugin: the name of its entry point, its origin, and what it registered."""
 
     name: str
     module: str
@@ -62,27 +61,27 @@ class Plugin:
 
     @property
     def hooks(self) -> tuple[str, ...]:
-        """The hooks that it uses."""
+        """The hooks that it implements."""
         return tuple(f"register_{kind}" for kind in self.things)
 
 
 @frozen
 class Plugins:
-    """All plugins that are in, and why others are not."""
+    """All loaded plugins, and the reasons why others were left out."""
 
     loaded: tuple[Plugin, ...]
     problems: tuple[Message, ...]
 
     def owner(self, kind: str, name: str) -> Plugin | None:
-        """The plugin that registered this name."""
+        """The plugin that registered `name`; None if none did."""
         return next((plugin for plugin in self.loaded if name in plugin.things.get(kind, ())), None)
 
 
 def registry(kind: str, builtin: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Name -> thing of one kind: the built-in ones first, then what the plugins registered.
+    """Name -> thing of one kind: built-in things, then those registered by plugins.
 
-    A plugin's thing that bears the name of a built-in one, or is of no use for its kind (NCF508), is left out with a
-    warning (an error in strict mode).
+    A plugin's thing with the name of a built-in one, or unusable for its kind (NCF508), is left out with a warning (in
+    strict mode: an error).
     """
     assert kind in KINDS, f"{kind!r} is none of {KINDS}"
     things = dict(builtin or {})
@@ -102,11 +101,11 @@ NEEDS = {
     "commands": ("main", "get_short_help_str"),
     "dialects": ("grammar", "suffixes", "signature", "language", "semantics"),
 }
-"""Kind -> what its things have, of those kinds that are not merely called."""
+"""Kind -> attributes that its things must have, for kinds that are not just functions."""
 
 
 def lacking(kind: str, thing: Any) -> str:
-    """Why a thing cannot be one of its kind; empty if it can."""
+    """Why a thing is unusable for its kind, in words; empty if it is usable."""
     if kind == "effects":
         return (
             "" if hasattr(thing, "effects") or hasattr(thing, "candidates") else "it has no effects and no candidates"
@@ -129,20 +128,20 @@ def lacking(kind: str, thing: Any) -> str:
 
 @cache
 def leave(plugin: str, source: str, kind: str, name: str, why: str) -> None:
-    """Say once that something of a plugin is left out."""
+    """Report, once, that a thing of a plugin is left out."""
     of = f" of {source}" if source else ""
     text = f"{name!r} of plugin {plugin!r}{of} left out of the {kind}: {why}"
     report(Message("NCF508", text, hint="tell its author; docs/plugins.md says what each hook registers"))
 
 
 LONG = 7
-"""A word of a title with so many letters is the name of a make or a control: `sinumerik`, `klartext`."""
+"""Smallest number of letters of a title's word that is compared: names of makes and controls (`sinumerik`)."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """A hint for a name that nobody registered: the one that was meant, perhaps, or all there are.
+    """A hint for an unknown name: the most similar known name, or all of them.
 
-    known  the names; of a mapping to things with a `title` also the long words of these are compared
+    known  the names; of a mapping to things with a `title`, long words of the titles are compared, too
     """
     from difflib import get_close_matches
 
@@ -156,12 +155,12 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 @lru_cache(maxsize=1)
 def load_plugins() -> Plugins:
-    """Every plugin of the entry-point group, loaded once per process; `load_plugins.cache_clear()` forgets them."""
+    """All plugins of the entry-point group, loaded once per process; `load_plugins.cache_clear()` resets this."""
     return collect(installed())
 
 
 def installed() -> list[EntryPoint]:
-    """The entry points of the group that are not disabled; those of ncfix first, then by distribution and name."""
+    """The enabled entry points of the group; those of ncfix first, then by distribution and name."""
     disabled = {name.strip() for name in os.environ.get("NCFIX_DISABLE_PLUGINS", "").split(",")}
     points = {(distribution(point), point.name): point for point in entry_points(GROUP)}
     order = sorted(points, key=lambda key: (key[0] != "ncfix", key))
@@ -169,7 +168,7 @@ def installed() -> list[EntryPoint]:
 
 
 def collect(points: Iterable[EntryPoint]) -> Plugins:
-    """Load these entry points in order, each whole or not at all."""
+    """Load plugins in order, each completely or not at all."""
     loaded: list[Plugin] = []
     problems: list[Message] = []
     for point in points:
@@ -183,7 +182,7 @@ def collect(points: Iterable[EntryPoint]) -> Plugins:
 
 
 def load_one(point: EntryPoint, earlier: Iterable[Plugin]) -> Plugin:
-    """Import one plugin and let it register everything, which nobody sees unless all goes well."""
+    """Import one plugin and collect what it registers; nothing takes effect unless all of it succeeds."""
     try:
         module = point.load()
     except (Exception, SystemExit) as error:
@@ -199,7 +198,7 @@ def load_one(point: EntryPoint, earlier: Iterable[Plugin]) -> Plugin:
 
 
 def import_hint(error: BaseException) -> str:
-    """What helps with a plugin that cannot be imported: the name that was meant, or to whom to go."""
+    """A hint for a plugin that cannot be imported: the name that was probably meant, or whom to contact."""
     if isinstance(error, ImportError):
         found = re.match(r"cannot import name '(\w+)'", str(error))
         if found and error.name is not None and error.name.partition(".")[0] == OWN:
@@ -209,9 +208,9 @@ def import_hint(error: BaseException) -> str:
 
 
 def hooks_of(point: EntryPoint, module: object) -> list[pluggy.HookCaller]:
-    """The hooks that the plugin implements; refuses hooks that ncfix does not have, and none at all.
+    """The hooks that the plugin implements; unknown hooks are refused, and plugins without hooks.
 
-    Every plugin has a manager of its own, so that one that is left out leaves nothing behind.
+    Each plugin has its own manager, so that a plugin that is left out leaves nothing behind.
     """
     manager = pluggy.PluginManager(GROUP)
     manager.add_hookspecs(hookspecs)
@@ -232,7 +231,7 @@ def hooks_of(point: EntryPoint, module: object) -> list[pluggy.HookCaller]:
 
 
 def hook_hint(manager: pluggy.PluginManager, module: object) -> str:
-    """What the author may have meant."""
+    """A hint with the hook that was probably meant."""
     from difflib import get_close_matches
 
     unknown = [hook.name for hook in manager.get_hookcallers(module) or () if not hook.has_spec()]
@@ -241,7 +240,7 @@ def hook_hint(manager: pluggy.PluginManager, module: object) -> str:
 
 
 def registrations(point: EntryPoint, hooks: Iterable[pluggy.HookCaller]) -> Things:
-    """Call the hooks of a plugin; what it registers, by kind."""
+    """Call the hooks of a plugin; returns what it registers, by kind."""
     things: dict[str, dict[str, Any]] = {}
     for hook in hooks:
         kind = hook.name.removeprefix("register_")
@@ -259,14 +258,14 @@ def registrations(point: EntryPoint, hooks: Iterable[pluggy.HookCaller]) -> Thin
 
 @frozen
 class Registrar:
-    """The `register` function of one hook of one plugin."""
+    """The function `register` passed to one hook of one plugin."""
 
     plugin: str
     kind: str
     things: dict[str, Any]
 
     def __call__(self, thing: Any, name: str | None = None) -> None:
-        """File `thing` under `name` or its own name."""
+        """Register `thing` under `name` or its own name."""
         key = name if name is not None else getattr(thing, "name", None)
         if not isinstance(key, str) or not key:
             text = f"plugin {self.plugin!r} left out: it registers {thing!r} of {self.kind} without a name"
@@ -277,32 +276,32 @@ class Registrar:
 
 
 def report(message: Message) -> None:
-    """Warn of a plugin that is left out; raise in strict mode."""
+    """Warn that a plugin is left out; in strict mode, raise."""
     if os.environ.get("NCFIX_STRICT_PLUGINS", "") not in ("", "0"):
         raise PluginError((message,))
     warnings.warn(PluginWarning(message), stacklevel=2)
 
 
 def left_out(code: str, point: EntryPoint, why: str, hint: str) -> PluginError:
-    """The error that says that this plugin is not in, and why."""
+    """The error that a plugin is left out, with the reason."""
     source = f" of {distribution(point)}" if distribution(point) else ""
     return PluginError((Message(code, f"plugin {point.name!r}{source} left out: it {why}", hint=hint),))
 
 
 def taken(plugin: str, kind: str, name: str, owner: str) -> Message:
-    """Remark on a name that is taken."""
+    """The message that a name is already registered."""
     text = f"plugin {plugin!r} left out: it registers {name!r} of {kind}, which {owner} has registered"
     return Message("NCF503", text, hint="NCFIX_DISABLE_PLUGINS leaves one of them out")
 
 
 def distribution(point: EntryPoint) -> str:
-    """The name of the distribution that an entry point belongs to, empty for none."""
+    """Name of an entry point's distribution; empty if it has none."""
     return described(point.dist)[0]
 
 
 @cache
 def described(dist: Any) -> tuple[str, str]:
-    """Name and version of a distribution, empty for none."""
+    """Name and version of a distribution; empty for None."""
     if dist is None:
         return "", ""
     metadata = dist.metadata
@@ -316,17 +315,17 @@ def describe(error: BaseException) -> str:
 
 
 OWN = "ncfix"
-"""The distribution whose plugins are ncfix itself."""
+"""The distribution whose plugins are part of ncfix."""
 SINGULAR = {"bases": "basis"}
 
 
 def called(
     kind: str, name: str, function: Callable[..., Any], *arguments: Any, gives: type | tuple[type, ...] = object
 ) -> Any:
-    """What a function of a thing that is registered under this name returns.
+    """Call a function of the thing registered under `name`, and check its result.
 
-    Raises `PluginError`: NCF507 where a plugin's raises what is no error of ncfix, NCF508 where it returns something
-    that is none of the types that it must give.
+    Raises `PluginError`: NCF507 if a plugin's function raises anything but an error of ncfix, NCF508 if the result is
+    not of the types `gives`.
     """
     with working(kind, name):
         found = function(*arguments)
@@ -334,7 +333,7 @@ def called(
 
 
 def handed(kind: str, name: str, found: Any, gives: type | tuple[type, ...]) -> Any:
-    """What a plugin handed over; raises `PluginError` NCF508 if it is none of these types."""
+    """The object `found` that a plugin returned; raises `PluginError` NCF508 if it is not of the types `gives`."""
     plugin = _owner(kind, name)
     if plugin is None or isinstance(found, gives):
         return found
@@ -345,14 +344,14 @@ def handed(kind: str, name: str, found: Any, gives: type | tuple[type, ...]) -> 
 
 
 def useless(kind: str, name: str, why: str, hint: str) -> PluginError:
-    """The error NCF508 that says why what is registered under this name is of no use, and which plugin brings it."""
+    """The error NCF508: why the thing registered under `name` is unusable, and whose it is."""
     plugin = load_plugins().owner(kind, name)
     return PluginError.of("NCF508", why if plugin is None else f"{_said(plugin)}: {why}", hint=hint)
 
 
 @contextmanager
 def working(kind: str, name: str) -> Iterator[None]:
-    """While what is registered under this name is at work; raises `PluginError` NCF507, see `called`."""
+    """Context in which a registered thing works; raises `PluginError` NCF507, see `called`."""
     try:
         yield
     except NcfixError:
@@ -365,7 +364,7 @@ def working(kind: str, name: str) -> Iterator[None]:
 
 
 def blamed(error: BaseException) -> PluginError | None:
-    """The `PluginError` of an exception that came all the way up, if code of a plugin's was at work."""
+    """The `PluginError` for an uncaught exception if code of a plugin appears in its traceback; else None."""
     at_work = {_top(frame.f_globals.get("__name__", "")) for frame, _ in traceback.walk_tb(error.__traceback__)}
     try:
         plugins = load_plugins().loaded
@@ -385,9 +384,9 @@ def _failed(plugin: Plugin, what: str, error: BaseException) -> PluginError:
 
 
 def _where(module: str, trace: TracebackType | None, only: bool = False) -> str:
-    """The last line of the plugin's module that was at work, and that of ncfix below it, if it called that.
+    """The last line of the plugin's module in a traceback, and the line of ncfix that it called, if any.
 
-    only  nothing of ncfix: it objects to what the plugin gave it
+    only  without ncfix: it objected to what the plugin passed
     """
     last: dict[bool, str] = {}
     for frame, line in traceback.walk_tb(trace):
@@ -400,7 +399,7 @@ def _where(module: str, trace: TracebackType | None, only: bool = False) -> str:
 
 
 def _owner(kind: str, name: str) -> Plugin | None:
-    """The plugin of somebody else that registered this name."""
+    """The third-party plugin that registered this name; None otherwise."""
     plugin = load_plugins().owner(kind, name)
     return None if plugin is None or plugin.distribution == OWN else plugin
 

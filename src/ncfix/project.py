@@ -1,6 +1,6 @@
-"""The project file, `ncfix.toml`: what holds for the programs of a folder, so that a post only calls `ncfix fix FILE`.
+"""The project file, `ncfix.toml`: settings for the programs of a folder, so that a post only calls `ncfix fix FILE`.
 
-It is looked for from the folder of the program upwards. Paths in it are counted from its own folder.
+It is searched for from the program's folder upwards. Paths in it are relative to its own folder.
 
     machine = "mill.toml"
     setup = "vise.toml"
@@ -13,7 +13,7 @@ It is looked for from the folder of the program upwards. Paths in it are counted
     match = "five-axis/*.nc"
     setup = "plate.toml"
 
-The first of `[[programs]]` that matches the program's way down from the folder wins over what holds for all.
+The first entry of `[[programs]]` that matches the program's path below the folder overrides the general settings.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from ncfix.values import frozen
 NAME = "ncfix.toml"
 CODE = "NCF028"
 TEXTS = ("machine", "setup", "output", "dialect", "tool_table")
-"""Keys that are options of their own, each a text."""
+"""Keys with text values that are options by themselves."""
 
 
 @frozen
@@ -44,9 +44,9 @@ class Project:
     """A project file.
 
     path     as messages name it
-    folder   of the file
-    content  what it says, checked but for the names and values of options
-    text     of the file
+    folder   folder of the file
+    content  its settings; checked, except for names and values of options
+    text     text of the file
     """
 
     path: str
@@ -56,7 +56,7 @@ class Project:
 
     @classmethod
     def of(cls, program: str) -> Project | None:
-        """The project that a program, or a folder of programs, belongs to; `-` to that of the working folder."""
+        """The project of a program, or of a folder of programs; of the working folder for `-`. None: no project."""
         if program == "-":
             start = os.getcwd()
         else:
@@ -70,7 +70,7 @@ class Project:
 
     @classmethod
     def load(cls, path: str) -> Project:
-        """Read a project file; raises SourceError NCF002, ConfigError NCF028 with all that is wrong in it."""
+        """Read a project file; raises SourceError NCF002, or ConfigError NCF028 with everything that is wrong in it."""
         text = decoded(read_bytes(path, MOST_SAID), path, CODE)
         content = parsed(text, path, CODE, "docs/formats.md shows a project file")
         project = cls(path, os.path.dirname(path), content, text)
@@ -79,7 +79,7 @@ class Project:
         return project
 
     def settings(self, program: str) -> dict[str, Any]:
-        """What holds for a program: values of options by their names as in the file; for paths see `from_here`."""
+        """Option name as in the file -> value, for a program; for paths see `from_here`."""
         found: dict[str, Any] = {}
         for table in (self.content, *self._matching(program)):
             found |= {key: table[key] for key in TEXTS if key in table}
@@ -87,7 +87,7 @@ class Project:
         return found
 
     def is_output(self, program: str, below: str) -> bool:
-        """Whether a program lies in one of the output folders, of those that are themselves below a folder."""
+        """Whether a program lies in an output folder of the project; only output folders below `below` count."""
         tables = (self.content, *self.content.get("programs", ()))
         named = [
             place["output"] for table in tables for place in (table, table.get("options", {})) if "output" in place
@@ -96,12 +96,12 @@ class Project:
         return any(way_below(each, program) and way_below(below, each) not in ("", os.curdir) for each in folders)
 
     def fault(self, text: str, *keys: str | int, hint: str = "") -> Message:
-        """What is wrong with a key, with its place."""
+        """The error message for a key, with its place."""
         line = line_of(keys, key_lines(self.text))
         return Message(CODE, text, place_of(line, self.text, self.path), hint)
 
     def way_to(self, key: str, value: object) -> tuple[str | int, ...]:
-        """Where the file gives a key this value, from the outermost table on."""
+        """The path of keys at which the file gives `key` this value, from the outermost table on."""
         programs = self.content.get("programs", ())
         tables = [((), self.content), *((("programs", number), each) for number, each in enumerate(programs))]
         for way, table in tables:
@@ -111,7 +111,7 @@ class Project:
         return ()
 
     def from_here(self, path: str) -> str:
-        """A path that the file gives, as it is called from the working folder."""
+        """A path given in the file, relative to the working folder."""
         return os.path.join(self.folder, path)
 
     def _matching(self, program: str) -> Iterator[Mapping[str, Any]]:
@@ -152,7 +152,7 @@ class Project:
 
 
 def way_below(folder: str, path: str) -> str:
-    """The way down from a folder to a file; empty if it is not below it."""
+    """The path of a file relative to a folder; empty if it is not below it."""
     try:
         way = os.path.relpath(os.path.abspath(path), os.path.abspath(folder))
     except ValueError:  # another disk, on Windows
@@ -161,7 +161,7 @@ def way_below(folder: str, path: str) -> str:
 
 
 def _near(path: str) -> str:
-    """A path as it is called from the working folder, if that is shorter."""
+    """A path relative to the working folder, if that is shorter."""
     try:
         return min(os.path.relpath(path), path, key=len)
     except ValueError:  # another disk, on Windows
@@ -169,7 +169,7 @@ def _near(path: str) -> str:
 
 
 def written(settings: Mapping[str, str], resume: bool) -> str:
-    """A project file with these settings, to be read and changed by people."""
+    """The text of a project file with these settings, for people to edit."""
     head = "# What holds for the programs in this folder and below; docs/formats.md says what may stand here.\n"
     found = table_written(head, {key: settings.get(key) for key in TEXTS})
     options = table_written("[options]              # of ncfix fix, with _ for -", {"resume": resume})

@@ -1,10 +1,10 @@
-"""TOML files as people write them: decoded, parsed, read with all their faults, written.
+"""TOML files written by people: decoding, parsing, reading with all errors reported, and writing.
 
-Where a key stands the parser does not say. Paths are tuples of keys and indices, `("effect", 2, "degree")`. Only keys
-that stand at the start of a line are found; for others the line of the table that holds them is good enough.
+The parser does not report the places of keys, so they are found in the text. Paths are tuples of keys and indices,
+`("effect", 2, "degree")`. Only keys at the start of a line are found; for others the line of their table is used.
 
-A `TomlTable` is one table. Its readers return the value, or None if it is missing or wrong: then there is a message,
-and the reading goes on. `close` notes the keys that nobody asked for.
+A `TomlTable` is one table. Its readers return the value, or None if it is missing or wrong: then a message is recorded,
+and reading continues. `close` reports keys that were never read.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ DOTTED = rf"{KEY}(?:\s*\.\s*{KEY})*"
 HEADER = re.compile(rf"\s*(\[\[?)\s*({DOTTED})\s*\]")
 ASSIGNMENT = re.compile(rf"\s*({DOTTED})\s*=")
 LONG_TEXTS = ('"""', "'''")
-"""What texts of several lines stand between."""
+"""Delimiters of multi-line strings."""
 QUOTED = re.compile(r'"""|\'\'\'|"(?:[^"\\]|\\.)*"|\'[^\']*\'|#.*')
-"""Such a mark, a text in one line, or a comment."""
+"""Such a delimiter, a string in one line, or a comment."""
 OTHERS = {
     "a measurement": re.compile(r"# *ncfix-measurement"),
     "an NC program": re.compile(r"\s*(?:[%;(]|[NOG][\d.]++[ \t]*+(?!=)|\d*\s*BEGIN PGM)"),
 }
-"""How files begin that are named where TOML is meant."""
+"""Beginnings of other files that may be given instead of TOML."""
 WIDTH = 120
-"""Characters in a line that is written."""
+"""Largest number of characters of a written line."""
 LARGEST = 1e12
-"""No quantity of a machine has a larger number, in whatever unit; beyond it arithmetic goes wrong."""
+"""Largest absolute value of a number, in any unit: no quantity of a machine is larger, and arithmetic stays safe."""
 
 
 def decoded(source: bytes, path: str, code: str) -> str:
-    """The text of a file, without the mark that some editors put before it; raises `ConfigError` with this code."""
+    """The text of a file, without a byte order mark; raises `ConfigError` with the given code."""
     try:
         return source.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -56,7 +56,7 @@ def decoded(source: bytes, path: str, code: str) -> str:
 
 
 def parsed(text: str, path: str, code: str, hint: str = "") -> dict[str, Any]:
-    """What a text says; raises `ConfigError` with this code and the place if it is not TOML."""
+    """The content of a TOML text; raises `ConfigError` with the given code and the place if it is not TOML."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -74,7 +74,7 @@ def parsed(text: str, path: str, code: str, hint: str = "") -> dict[str, Any]:
 
 
 def place_of(line: int, text: str, path: str) -> Place:
-    """A line, and in it the first character that is not a blank."""
+    """A line, with the column of its first character that is not a blank."""
     row = _row(text, line)
     return Place(path, line, len(row) - len(row.lstrip()) + 1 if row.strip() else 0, row)
 
@@ -85,7 +85,7 @@ def _row(text: str, line: int) -> str:
 
 
 def key_lines(text: str) -> Mapping[Path, int]:
-    """Path -> line, from 1, of every table header and every key that stands at the start of a line."""
+    """Path -> line number, from 1, of every table header and every key at the start of a line."""
     lines: dict[Path, int] = {(): 1}
     counts: dict[Path, int] = {}
     table: Path = ()
@@ -103,7 +103,7 @@ def key_lines(text: str) -> Mapping[Path, int]:
 
 
 def _left_open(line: str, quote: str) -> str:
-    """The mark of the text that goes on behind a line, or "", if one with the mark `quote` went on before it."""
+    """The delimiter of the string that is still open after a line, or ""; `quote`: that of one open before it."""
     at = 0
     while True:
         if quote:
@@ -118,20 +118,20 @@ def _left_open(line: str, quote: str) -> str:
 
 
 def _note(path: Path, known: int, number: int, lines: dict[Path, int]) -> None:
-    """A path, and the tables that its dots make, beyond the `known` first of its keys."""
+    """Record the line of a path and of the tables that its dots create, beyond the first `known` keys."""
     for depth in range(known + 1, len(path) + 1):
         lines.setdefault(path[:depth], number)
 
 
 def line_of(path: Path, lines: Mapping[Path, int]) -> int:
-    """The line of this key, or of the nearest table around it."""
+    """The line of a key, or of the nearest enclosing table."""
     while path not in lines:
         path = path[:-1]
     return lines[path]
 
 
 def _opened(keys: Path, repeated: bool, counts: dict[Path, int]) -> Path:
-    """The path of a table header; tables of an array are counted."""
+    """The path of a table header; the tables of an array are numbered."""
     path: Path = ()
     for depth, name in enumerate(keys):
         path = (*path, name)
@@ -150,7 +150,7 @@ def _keys(dotted: str) -> Path:
 
 
 class KeyCodes(NamedTuple):
-    """Message codes of the faults that any key may have, see `Report`."""
+    """Message codes for errors that any key can have, see `Report`."""
 
     unknown: str
     missing: str
@@ -164,10 +164,10 @@ MACHINE_FILE = KeyCodes("NCF302", "NCF303", "NCF304", "NCF305", "NCF308")
 
 @mutable
 class Report:
-    """The faults found so far, with their places in the text.
+    """The errors found so far, with their places in the text.
 
-    top    keys that stand above all tables: one that stands below a header is in that table
-    codes  of faults of a key: it is unknown, missing, of another kind, a number that cannot be, a range that is none
+    top    keys that belong above all tables; below a header they belong to that table
+    codes  of errors: unknown key, missing key, wrong type, impossible number, empty range
     """
 
     path: str
@@ -178,7 +178,7 @@ class Report:
     codes: KeyCodes = MACHINE_FILE
 
     def note(self, code: str, where: Path, text: str, hint: str = "") -> None:
-        """Note a fault of the value at `where`."""
+        """Record an error of the value at `where`."""
         place = place_of(line_of(where, self.lines), self.text, self.path)
         head = f"{dotted(where)}: " if where else ""
         self.messages.append(Message(code, head + text, place, hint))
@@ -194,16 +194,16 @@ class TomlTable:
     asked: set[str] = field(default_factory=set)
 
     def note(self, code: str, key: str, text: str, hint: str = "") -> None:
-        """Note a fault of one key."""
+        """Record an error of one key."""
         self.report.note(code, (*self.path, key), text, hint)
 
     def has(self, key: str) -> bool:
-        """Whether the key is there."""
+        """Whether the key is present; it then counts as read."""
         self.asked.add(key)
         return key in self.values
 
     def get(self, key: str, required: bool = False) -> Any:
-        """The raw value, or None; a required key that is missing is noted."""
+        """The raw value, or None; a missing required key is recorded as an error."""
         if not self.has(key):
             if required:
                 hint = did_you_mean(key, [each for each in self.values if each not in self.asked])
@@ -234,14 +234,14 @@ class TomlTable:
         return float(value) if self._finite(key, value, "a number") else None
 
     def positive(self, key: str) -> float | None:
-        """A number above zero; one that is not is noted, and returned."""
+        """A number above zero; any other is recorded as an error, and returned."""
         value = self.number(key)
         if value is not None and value <= 0:
             self.note(self.report.codes.number, key, f"{value:g} is not positive")
         return value
 
     def range(self, key: str, hint: str = "") -> tuple[float, float] | None:
-        """Two numbers, the lower one first; `hint` is for those that are not."""
+        """Two numbers, the lower one first; `hint` is used if they are not."""
         values = self.numbers(key, count=2)
         if values is None:
             return None
@@ -251,7 +251,7 @@ class TomlTable:
         return low, high
 
     def choice(self, key: str, *options: str, required: bool = False, hint: str | None = None) -> str | None:
-        """One of two words; without a `hint` the nearer one is named."""
+        """One of the `options`; without a `hint` the most similar one is named."""
         value = self.text(key, required)
         if value is not None and value not in options:
             meant = did_you_mean(value, options) if hint is None else hint
@@ -305,7 +305,7 @@ class TomlTable:
         return tuple(tuple(float(item) for item in row) for row in value) if all(good) else None
 
     def table(self, key: str, required: bool = False) -> TomlTable | None:
-        """A table in this one."""
+        """The table under a key."""
         value = self.get(key, required)
         if value is None:
             return None
@@ -315,7 +315,7 @@ class TomlTable:
         return TomlTable(value, (*self.path, key), self.report)
 
     def tables(self, key: str) -> Iterator[TomlTable]:
-        """The tables of an array [[key]]."""
+        """The tables of an array `[[key]]`."""
         value = self.get(key)
         if value is None:
             return
@@ -326,7 +326,7 @@ class TomlTable:
             yield TomlTable(item, (*self.path, key, index), self.report)
 
     def close(self) -> None:
-        """Note the keys that nobody asked for."""
+        """Report the keys that were never read."""
         for key in self.values:
             if key in self.asked:
                 continue
@@ -355,13 +355,13 @@ class TomlTable:
 
 
 def dotted(path: Path) -> str:
-    """A path as people write it: effect[2].degree, entries counted from 0."""
+    """A path as people write it: effect[2].degree, with entries counted from 0."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
     return text.removeprefix(".")
 
 
 def shown(value: object) -> str:
-    """A value in a message: what it is, not all of it."""
+    """A value for a message; lists and tables only by their kind."""
     if isinstance(value, list):
         return f"a list of {len(value)}"
     if isinstance(value, dict):
@@ -374,7 +374,7 @@ def _is_integer(value: object) -> TypeGuard[int]:
 
 
 def did_you_mean(word: str, words: Iterable[str]) -> str:
-    """A hint with the nearest of the words, whatever their case; empty if none is near."""
+    """A hint with the most similar word, ignoring case; empty if none is similar."""
     small = {each.lower(): each for each in words}
     close = get_close_matches(word.lower(), small, 1, 0.6)
     return f"did you mean {small[close[0]]!r}?" if close else ""
@@ -384,7 +384,7 @@ def did_you_mean(word: str, words: Iterable[str]) -> str:
 
 
 def written(header: str, table: Mapping[str, Any]) -> str:
-    """A table as text: its header, and a line a key; what is None is left out."""
+    """A table as text: its header, and one line per key; values None are left out."""
     rows = [f"{_key(key)} = {_value(item, len(key) + 3)}" for key, item in table.items() if item is not None]
     return "\n".join([header, *rows])
 
@@ -395,7 +395,7 @@ def _key(key: str) -> str:
 
 
 def _value(item: Any, indent: int = 0) -> str:
-    """A value in TOML; long lists go over several lines."""
+    """A value in TOML; long lists take several lines."""
     if isinstance(item, bool):
         return "true" if item else "false"
     if isinstance(item, int):

@@ -1,11 +1,11 @@
-"""Dataclasses made in a tenth of the time: `frozen` for values that travel, `mutable` for what changes.
+"""Dataclasses that are created ten times faster: `frozen` for values, `mutable` for objects that change.
 
-For each class `dataclasses` writes three to six methods as text and compiles every one while the module is imported.
-ncfix has hundreds of such classes: that took a third of a short run. Here all but one of the methods are functions that
-need no text, and `__init__` is written when a class is first called, which most classes of a run never are.
+`dataclasses` generates three to six methods of each class as text and compiles them at import. ncfix has hundreds of
+such classes: that took a third of a short run. Here all methods but one are closures, and `__init__` is generated when
+a class is first called, which in one run most classes never are.
 
-All else is left to `dataclasses`: its `field`, `fields`, `replace` and `asdict`, and `match`, take these classes for
-what they are. One thing differs: a subclass of a frozen one that is a dataclass itself has to be `frozen`, too.
+Everything else is left to `dataclasses`: `field`, `fields`, `replace`, `asdict` and `match` work with these classes.
+One difference: a dataclass derived from a frozen one must be `frozen`, too.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ def frozen(
 
 @dataclass_transform(frozen_default=True, field_specifiers=(Field, field))
 def frozen(cls: type[T] | None = None, /, **options: bool) -> type[T] | Callable[[type[T]], type[T]]:
-    """Make a class a dataclass with slots that does not change; the options are those of `dataclasses.dataclass`.
+    """Make a class an immutable dataclass with slots; the options are those of `dataclasses.dataclass`.
 
-    A method that the class writes itself stays. Setting or deleting an attribute of an object raises
+    A method that the class defines itself is kept. Setting or deleting an attribute of an object raises
     FrozenInstanceError.
     """
     if cls is None:
@@ -53,7 +53,7 @@ def mutable(
 
 @dataclass_transform(field_specifiers=(Field, field))
 def mutable(cls: type[T] | None = None, /, **options: bool) -> type[T] | Callable[[type[T]], type[T]]:
-    """Make a class a dataclass with slots that may change, and has no hash if objects are compared (`eq`)."""
+    """Make a class a mutable dataclass with slots; without hash if objects are compared (`eq`)."""
     if cls is None:
         return lambda cls: _made(cls, False, **options)
     return _made(cls, False)
@@ -80,7 +80,7 @@ def _made(
 
 
 class _Init:
-    """The `__init__` of a class, until it is first asked for: then it is written, and takes this one's place."""
+    """Placeholder for the `__init__` of a class; on first access it generates the real one and replaces itself."""
 
     def __init__(self, cls: type, stays: bool) -> None:
         self.cls, self.stays = cls, stays
@@ -92,7 +92,7 @@ class _Init:
 
 
 def _init_of(cls: Any, stays: bool) -> Callable[..., None]:
-    """The `__init__` that `dataclasses` would write."""
+    """The `__init__` that `dataclasses` would generate."""
     names: dict[str, Any] = {"put": PUT, "MISSING": MISSING}
     positional, by_name, lines = ["self"], list[str](), list[str]()
     for each in fields(cls):
@@ -121,7 +121,7 @@ def _init_of(cls: Any, stays: bool) -> Callable[..., None]:
 
 
 def _comparing(cls: Any) -> tuple[Callable[..., object], Callable[..., int]]:
-    """`__eq__` and `__hash__`, by the fields that are compared."""
+    """`__eq__` and `__hash__` over the fields that are compared."""
     names = [each.name for each in fields(cls) if each.compare]
     values: Callable[[object], object] = lambda self: tuple([getattr(self, name) for name in names])  # noqa: E731
     if len(names) > 1:

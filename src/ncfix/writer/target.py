@@ -1,10 +1,10 @@
-"""What one corrected motion shall become in a block, and what became of it: what `BlockWriter` takes and gives back.
+"""Input and output of writing one motion into a block, for `BlockWriter`.
 
-In inverse time LinuxCNC moves linear axes no slower than `LEAST_PACE`. A turn that this would hurry gets the F of its
-little linear motion too, in feed per minute (G94), and G93 again behind it.
+In inverse time LinuxCNC moves linear axes no slower than `LEAST_PACE`. A rotation that this would speed up gets the F
+of its small linear motion as feed per minute (G94), and G93 is restored after it.
 
-`FrameMap` goes from commands to the numbers of a program and back. `RetractLevels` knows the level R of canned cycles:
-what it shall be in a block, what is in force, and where the control stands then.
+`FrameMap` converts between commands and program numbers. `RetractLevels` tracks the level R of canned cycles: its value
+for a block, the value in force, and the resulting position of the control.
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ from ncfix.values import frozen, mutable
 from ncfix.writer.pieces import Pieces
 
 LINE = 10
-"""The code of straight motions at feed, in tenths."""
+"""Motion code of straight feed motions, in tenths."""
 
 TANGENTIAL = {1010: 30, 1011: 20}
-"""Codes of arcs that go on in the direction of the motion before them, to the left and to the right: once that motion
-is corrected they are not the same arcs any more, and are written as those that they were."""
+"""Codes of tangential arcs, to the left and to the right, and the codes as which they are written: once the motion
+before them is corrected, a tangential arc would not be the same arc any more."""
 
 
 LEAST_PACE = 0.1
-"""Units per minute; what LinuxCNC makes of slower motions in inverse time (`inverse_time_rate_straight`)."""
+"""Smallest speed, units per minute, to which LinuxCNC raises motions in inverse time (`inverse_time_rate_straight`)."""
 FEED_GROUPS = ("XYZ", "UVW", "ABC")
-"""The axes whose way F is the speed of: the first group that moves (LinuxCNC, "Machining Center Overview", feed)."""
+"""Axes to whose path F refers: those of the first group that moves (LinuxCNC, "Machining Center Overview", feed)."""
 DIGITS = 6
-"""Significant digits of an F word of ours."""
+"""Significant digits of a new F word."""
 
 
 @frozen
 class Level:
-    """What the level R of a canned cycle shall be, in program numbers.
+    """The level R of a canned cycle, in program numbers.
 
-    across   the column of the axis along which the cycle drills
-    wanted   what R shall be
-    nominal  what it was as programmed
-    before   what is in force before the block, NaN where that is not known
-    least    R must not be lower; NaN: it may
-    address  what stands for R
+    across   column of the drilling axis
+    wanted   intended R
+    nominal  R as programmed
+    before   R in force before the block; NaN if not known
+    least    lower limit of R; NaN: none
+    address  address of the level's word
     """
 
     across: int
@@ -60,43 +60,44 @@ class Level:
 
 @frozen
 class Target:
-    """What one motion shall become, in program numbers.
+    """What one motion must become, in program numbers.
 
     letters      axis letters of the columns
     resolved     (n_axes,) the least increment
-    decimals     (n_axes,) digits after the point that it needs
-    start        (n_axes,) where the control stands, as emitted so far (NaN unknown)
-    nominal      (n_axes,) where the motion ended as programmed
-    original     (n_axes,) value of each programmed word: target or increment
-    ends         (k, n_axes) where its pieces shall end
-    arc          the first piece is an arc
-    centre       (3,) of that arc, and
+    decimals     (n_axes,) number of decimals that it needs
+    start        (n_axes,) position of the control, as written so far (NaN unknown)
+    nominal      (n_axes,) end of the motion as programmed
+    original     (n_axes,) value of each programmed word: position or increment
+    ends         (k, n_axes) intended ends of its pieces
+    arc          whether the first piece is an arc
+    centre       (3,) the intended centre of that arc
     original_centre (3,) the centre as programmed, absolute
-    origin       (3,) the start of the motion as programmed: what incremental centres were meant from
+    origin       (3,) the start of the motion as programmed, to which incremental centres referred
     plane        the arc's two axes in its plane and the one across it, as indices of X Y Z
     spatial      columns of X Y Z (-1: not an axis of the machine)
     diameter     X is a diameter; centres and radii are not
-    incremental, centre_absolute   how words are meant
-    shares       (k,) fraction of the block's time in each piece, for G93
+    incremental, centre_absolute   modes of axis and centre words
+    shares       (k,) share of the block's time for each piece, for G93
     inverse_time the block's F is the time of the block
-    code         motion code the pieces need, tenths
-    active_code  motion code in force before the block, as emitted
-    feed         the number after F that is in force, NaN where there is none
-    turn_minutes the time of a turn of rotary axes alone whose F is degrees per minute; NaN for other motions
-    turn_by_feed that time is kept by F, as the speed of the axes that the control goes by; else by inverse time
-    back_to_inverse_time   the turn was in inverse time, and is again behind it
-    increments   what a number without a decimal point counts, linear and rotary words; 1.0 where the point is nothing
-    rotary       (n_axes,) which axes turn
-    arcs, centres (k,), (k, 3): where an arc becomes several pieces, which of them are arcs, and about what
+    code         motion code that the pieces need, tenths
+    active_code  motion code in force before the block, as written
+    feed         number of the F word in force, NaN if there is none
+    turn_minutes time, min, of a rotation of rotary axes alone whose F is degrees per minute; NaN for other motions
+    turn_by_feed that time is kept by an F for the axes to which the control applies it; else by inverse time
+    back_to_inverse_time   the rotation was in inverse time, which is restored after it
+    increments   weight of a number without a decimal point, linear and rotary words; 1.0 if the point makes no
+                 difference
+    rotary       (n_axes,) which axes are rotary
+    arcs, centres (k,), (k, 3): for an arc split into several pieces, which of them are arcs, and their centres
     arc_code     motion code of these, tenths
-    pointing     how rotary positions (rad) point the tool, where the program gives its direction
-    rotation     (3, 3) how the frame is turned
+    pointing     how rotary positions (rad) point the tool, if the program gives its direction
+    rotation     (3, 3) rotation of the frame
     offset       (n_axes,) of the frame, mm and rad
-    level        of a canned cycle whose R is to be written: what it shall be
-    measured     (n_axes,) axes whose words are computed at run time, and must be; empty: no axis
+    level        level of a canned cycle whose R is written
+    measured     (n_axes,) axes whose words must stay computed at run time; empty: none
     wordless     (n_axes,) axes that have no word and must get none
-    call         of a canned cycle whose depth stands in a call of its own
-    spelled      (n_axes,) axes that get a word even if they stand where it leads; empty: no axis
+    call         call, in a block of its own, of the canned cycle whose depth it contains
+    spelled      (n_axes,) axes that get a word even if it does not move them; empty: none
     """
 
     letters: tuple[str, ...]
@@ -139,7 +140,7 @@ class Target:
 
     @property
     def last_code(self) -> int:
-        """The motion code in force after the pieces, in tenths; behind a call in a block of its own as before."""
+        """The motion code in force after the pieces, in tenths; a call in a block of its own does not change it."""
         if self.call is not None and not self.call.modal:
             return self.active_code
         if self.arcs is None:
@@ -147,7 +148,7 @@ class Target:
         return self.arc_code if self.arcs[-1] else LINE
 
     def at_their_pace(self) -> Target:
-        """This target, with a feed per minute for a turn that LinuxCNC would hurry in inverse time."""
+        """This target, with feed per minute if LinuxCNC would speed up the rotation in inverse time."""
         path = np.vstack((self.start, np.round(self.ends * 10.0**self.decimals) / 10.0**self.decimals))
         linear = [letter not in FEED_GROUPS[-1] for letter in self.letters]
         steps = np.linalg.norm(np.diff(path, axis=0)[:, linear], axis=1)
@@ -161,7 +162,7 @@ class Target:
 
     @property
     def is_dragged(self) -> bool:
-        """Whether a turn of rotary axes alone gets a linear motion, which would take its feed over."""
+        """Whether a rotation of rotary axes alone gets a linear motion, to which the control would apply its feed."""
         if np.isnan(self.turn_minutes):
             return False
         linear = np.array([letter not in FEED_GROUPS[-1] for letter in self.letters])
@@ -172,14 +173,14 @@ class Target:
 
 @mutable
 class Rendered:
-    """The edits (start, stop, text) of the source, the lines to put after the block, and what they amount to.
+    """The edits (start, stop, text) of the source, the lines inserted after the block, and the resulting motion.
 
-    centre, centres  of the first piece if it is an arc, and of further ones by their number
-    level            the R that is in force behind the block, if that is known
-    conflict         why the motion cannot be written after all; empty if it is
-    code             the motion code that is in force behind the block, in tenths, if it is another than was asked for
-    opens            what is written begins with a call of a cycle, which replaces the one in force
-    closing          the line behind it with which the call before comes back, unless the next block opens with its own
+    centre, centres  centre of the first piece if it is an arc, and of further pieces by their index
+    level            R in force after the block, if known
+    conflict         why the motion cannot be written; empty if it can
+    code             motion code in force after the block, in tenths, if it differs from the one asked for
+    opens            whether the text begins with a cycle call, which replaces the one in force
+    closing          line after it that restores the previous call, unless the next block opens with a call
     """
 
     edits: list[tuple[int, int, str]] = field(default_factory=list)
@@ -194,26 +195,26 @@ class Rendered:
     closing: str = ""
 
     def lines_before(self, next_block: Rendered | None) -> list[str]:
-        """The lines to put after the block, where that is what is written of the next one; None: nothing."""
+        """The lines to insert after the block, given what is written of the next one (None: nothing)."""
         called = next_block is not None and next_block.opens
         return [*self.lines, self.closing] if self.closing and not called else self.lines
 
     @property
     def text(self) -> tuple[object, ...]:
-        """What the control reads; two executions of a block agree when this is equal."""
+        """What the control reads; two executions of a block agree if this is equal."""
         return (tuple(self.edits), tuple(self.lines), self.closing)
 
 
 def plane_across(normal: Array) -> tuple[int, int, int]:
-    """The two columns of an arc's plane and the one across it, from the plane's normal in program axes."""
+    """The two axes of an arc's plane and the one across it, from the plane's normal in program axes."""
     across = int(np.argmax(np.abs(normal)))
     return ((1, 2, 0), (2, 0, 1), (0, 1, 2))[across]
 
 
 def feed_way(letters: tuple[str, ...], begin: Array, end: Array, diameter: bool) -> float:
-    """The way that F is the speed of, in program units: of linear axes, of rotary axes where none of those moves.
+    """The length of path to which F refers, in program units: of linear axes; if none moves, of rotary axes.
 
-    begin, end  (n_axes,) program numbers; `diameter`: those of X are twice the way
+    begin, end  (n_axes,) program numbers; `diameter`: X is a diameter
     """
     step = end - begin
     if diameter and "X" in letters:
@@ -223,12 +224,12 @@ def feed_way(letters: tuple[str, ...], begin: Array, end: Array, diameter: bool)
 
 
 def feed_number(value: float) -> str:
-    """The number after F."""
+    """The number of a new F word."""
     return f"{value:.{max(3, DIGITS - 1 - int(np.floor(np.log10(value))))}f}"
 
 
 class FrameMap:
-    """One frame of a program for a given set of axes, with the maps both ways. Positions have shape (..., n_axes)."""
+    """Conversion between commands and program numbers in one frame. Positions have shape (..., n_axes)."""
 
     def __init__(self, frame: Frame, axes: tuple[str, ...], rotary: Mask) -> None:
         self.frame = frame
@@ -243,20 +244,20 @@ class FrameMap:
         self.origin = np.array([frame.offset[axes.index(letter)] if letter in axes else 0.0 for letter in "XYZ"])
 
     def program(self, command: Array) -> Array:
-        """Program numbers of a command (..., n_axes), mm and rad: in units of the program, in its frame."""
+        """Program numbers of a command (..., n_axes), mm and rad."""
         values = command - self.frame.offset
         if self.rotated:
             values[..., self.spatial] = _turned(values[..., self.spatial], self.rotation)
         return values / self.scale
 
     def decimals(self, steps: Array) -> Ints:
-        """(n_axes,) digits behind the point that numbers need for what the control can resolve, mm and rad."""
+        """(n_axes,) decimals that program numbers need for the resolution `steps` of the control, mm and rad."""
         return np.array([decimals_for(step) for step in steps / self.scale], dtype=np.int64)
 
     def still(self, unmoved: Mask) -> Mask:
-        """Axes that stand exactly where they stood, free of the rounding of these maps.
+        """Axes that are exactly at their old position, unaffected by the rounding of the conversion.
 
-        unmoved  (n_axes,) those that the program did not tell to move; in a rotated frame one of X Y Z moves them all
+        unmoved  (n_axes,) axes that the program does not move; in a rotated frame one of X Y Z moves them all
         """
         if not self.rotated or unmoved[self.spatial].all():
             return unmoved
@@ -272,11 +273,11 @@ class FrameMap:
         return values + self.frame.offset
 
     def program_point(self, point: Array) -> Array:
-        """A point X Y Z (mm, command coordinates) in program numbers; diameters do not apply to centres."""
+        """A point X Y Z (mm, command coordinates) in program numbers; centres are never diameters."""
         return np.asarray((point - self.origin) @ self.frame.rotation / self.unit)
 
     def point_of(self, program: Array) -> Array:
-        """X Y Z (3,) of a position (n_axes,) in the numbers in which centres are given: no diameters."""
+        """X Y Z (3,) of a position (n_axes,) in the numbers used for centres: never diameters."""
         point = np.zeros(3)
         point[self.axes] = program[self.spatial]
         if self.frame.diameter:
@@ -289,7 +290,7 @@ class FrameMap:
 
 
 def _turned(points: Array, rotation: Array) -> Array:
-    """Points (..., k) times a rotation; what is not known (NaN) stays with the coordinates that are made of it."""
+    """Points (..., k) times a rotation; NaN makes only those coordinates unknown that depend on it."""
     lost = np.isnan(points)
     if not lost.any():
         return np.asarray(points @ rotation)
@@ -299,12 +300,12 @@ def _turned(points: Array, rotation: Array) -> Array:
 
 
 class RetractLevels:
-    """The book that the control keeps of R.
+    """Tracks the level R that the control has in force.
 
-    Where a control stands at R and is to come back to where the series of holes began (G98), LinuxCNC goes up there
-    before it goes to the hole, but not from any higher than R: so R must not sink below where it stands.
+    If a control at R is to return to the level at which the series of holes began (G98), LinuxCNC rises to that level
+    before it moves to the hole, but only if it is not above R: so R must not be lowered below the current position.
 
-    in_force  the frame in whose numbers R was written, and R; None where that is not known
+    in_force  the frame in whose numbers R was written, and R; None if not known
     approach  (n_axes,) the command over the last hole at that level
     """
 
@@ -315,7 +316,7 @@ class RetractLevels:
         self.approach: Array | None = None
 
     def forget(self) -> None:
-        """Something else than a corrected cycle: R is not known any more."""
+        """R is no longer known, after anything but a corrected cycle."""
         self.in_force = self.approach = None
 
     def wanted(
@@ -328,9 +329,9 @@ class RetractLevels:
         here: Array,
         address: str,
     ) -> Level | None:
-        """What R shall be in the numbers of `frame` (its `number`), while the axes stand `here`; None of no cycle.
+        """The level R for a cycle in the numbers of `frame` (index `number`), with the axes at `here`; None: no cycle.
 
-        address  what stands for R
+        address  address of the level's word
         """
         moves, approach = self.moves, self.pieces.approach
         if approach is None or moves.approach is None or not np.isfinite(approach[piece]).all():
@@ -349,7 +350,7 @@ class RetractLevels:
         )
 
     def comes_back(self, row: int) -> bool:
-        """Whether the control ends at R (G99) behind a cycle, and not where it began."""
+        """Whether the control ends at R (G99) after a cycle, and not where it began."""
         moves = self.moves
         if moves.approach is None or row + 1 == len(moves):
             return False
@@ -357,7 +358,7 @@ class RetractLevels:
         return bool(on[moves.end[row] != moves.approach[row]].all())
 
     def note(self, number: int, frame: FrameMap, target: Target, rendered: Rendered) -> None:
-        """Note what was written."""
+        """Record the level that was written."""
         self.forget()
         if rendered.level is not None and target.level is not None:
             over = rendered.ends[-1].copy()
@@ -365,7 +366,7 @@ class RetractLevels:
             self.in_force, self.approach = (number, rendered.level), frame.command(over)
 
     def returns(self, row: int) -> Mask:
-        """(n_axes,) axes that stand at that level where the motion behind a cycle begins."""
+        """(n_axes,) axes that are at the level R at the start of the motion after a cycle."""
         if self.approach is None or self.moves.approach is None:
             return np.zeros(len(self.moves.axes), dtype=bool)
         level = self.moves.approach[row]
