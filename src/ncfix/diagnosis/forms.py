@@ -1,20 +1,12 @@
-"""Candidates as columns of the data: what each form of an effect would show, with a size of 1 um.
+"""Forms of all candidates as columns of the data, at a size of 1 um; and unnamed alternatives to the candidates.
 
-The size is the root mean square over rows of the length of what a row shows, before anything else is fitted, over the
-sort of rows that shows most. So all effects compete on one scale, that of the tool tip.
+The size of a form is the root mean square, over rows, of the length of its effect on a row's values, over the sort of
+rows where it is largest, before anything else is fitted. So all effects compete on one scale, that of the tool tip.
 
-Whatever depends smoothly on pose or time, or on from where the axes came: rivals at the tool tip.
-
-Gaussian processes of three independent components, along the tool, the base or the workpiece.
-
-Whatever one joint may do: rivals by its own position, its direction, another axis, time.
-
-All its six errors at once, with the same share each, and each of them alone.
-
-Effects without a name, as rivals of those with one.
-
-They hold more than any name does and pay for it in the evidence; where such a rival explains the data better all the
-same, the effect is not in the catalogue.
+An unnamed alternative describes an effect that is in no catalogue. It is more flexible than any name and pays for that
+in the evidence. There are two sorts. Smooth fields move the tool tip as a Gaussian process of pose, time or direction
+of approach, with three independent components along the axes of tool, base or workpiece. Joint errors are the six error
+motions of one joint, all together or one alone, as a function of its position or direction, another axis, time or load.
 """
 
 from __future__ import annotations
@@ -50,76 +42,79 @@ from ncfix.measure.observation import Observation, base_from_workpiece
 from ncfix.values import frozen
 
 VISIBLE = 0.05
-"""Share of an effect's squares that must be left beside what is free."""
+"""Smallest share of a form's squares that set-up and constants cannot absorb, for the form to be visible."""
 SHARE_DIGITS = 9
-"""Of such a share: what is behind them is rounding."""
+"""Decimals of such a share; further ones are rounding errors."""
 NEGLIGIBLE = 3e-3
-"""Share of a form's squares that may be dropped."""
+"""Share of a form's squares that may be dropped to save columns."""
 UNSEEN_UM = 1e-9
+"""Size below which a form is not seen at all, um rms."""
 HOLD_POINTS = tuple(product((-0.5, 0.5), repeat=3))
-"""Where what grows is held, in times `residual_data.HOLD_REACH`: in the middle of each eighth of it."""
+"""Assumed fixed points of an expanding part, in units of `residual_data.HOLD_REACH`: one for each octant."""
 HOLD_SPREAD = 0.5 / np.sqrt(3)
-"""How far from there it may be, rms, in each direction."""
+"""Standard deviation of the true fixed point from the assumed one, per direction, in the same units."""
 BATCH = 32
-"""Candidates or forms whose columns are worked out at once: of all of them these would take much memory."""
+"""Candidates or forms whose columns are computed at once, to limit memory."""
 LEAD_SHARE = 0.5
-"""Share of a tilt's squares that must be the tilt, not the shifts of a pivot elsewhere: else it has no lever here."""
+"""Smallest share of a tilt's squares that comes from the tilt and not from the shifts of its unknown pivot; with less
+it has no lever in these data."""
 UNNAMED_FAMILY = "unnamed"
-"""Family of the rivals."""
+"""Family of the unnamed alternatives."""
 POSE = Candidate("unknown by pose", "something that depends on where the axes are", "", UNNAMED_FAMILY, (), ())
 TIME = Candidate("unknown by time", "something that happens in the course of time", "", UNNAMED_FAMILY, (), ())
 DIRECTION = Candidate(
     "unknown by way", "something that depends on from where the axes came", "", UNNAMED_FAMILY, (), ()
 )
 POSE_LENGTHS = (0.8, 1.6)
-"""Of half the travel of every axis at once."""
+"""Correlation lengths of a smooth field of all axes, in units of half their travels."""
 PAIR_LENGTH = 0.7
-"""The same where two axes at a time matter."""
+"""The same for a product of functions of two axes."""
 JERK = 300.0
-"""s: over which a course of time bends that no warmth has."""
+"""Correlation time of a smooth course that is faster than thermal effects, s."""
 TIME_LENGTHS = (1200.0, 2400.0, 7200.0)
-"""s: over which it bends, with kinks, as thermal effects of the catalogue do: a rival may do what they may."""
+"""Correlation times of courses with kinks (Matern 3/2), as of the thermal effects of the catalogue, s."""
 STEP_MEMORY = 3600.0
-"""s: how long a step or a walk in time is remembered."""
+"""Correlation time of steps and random walks, s."""
 MOST_FUNCTIONS = 50
-"""Functions of pose or time that are kept, the smoothest."""
+"""Largest number of basis functions of a kernel, the smoothest ones."""
 DROPPED = 0.01
-"""Share of squares that may be dropped."""
+"""Share of squares that may be dropped to save columns."""
 VARIATION_LENGTH = 1.0
-"""Of half the travel of an axis, and of the time: over which the shape of an effect may differ from the catalogue's."""
+"""Correlation length of changes of an effect's shape, in units of half an axis's travel, or half of the time."""
 VARIATIONS = 16
-"""Functions of them that are kept."""
+"""Largest number of basis functions of a change of shape."""
 FULL_TURN = 270.0
-"""degree: an axis that turned further is taken for one that turns round and round."""
+"""A rotary axis that moved by more than this, degree, gets periodic functions."""
 JOINT_BEND = 0.4
-"""Length of the bends of what a joint may do, of half its travel."""
+"""Correlation length of an unnamed error of a joint, in units of half its travel."""
 TIME_BEND = 0.3
-"""The same of what time does."""
+"""The same over time, in units of half of the time."""
 WAVES = (1.0, 0.7, 0.5, 0.3, 0.2, 0.2)
-"""Variances of the waves a turn."""
+"""Variances of the harmonics of an unnamed error of a rotary axis."""
 PLAY = (1.0, 1.0, 0.5, 0.3)
+"""Variances of the powers of position in an unnamed error that depends on the direction."""
 JointPart = tuple[str, dict[str, Any], Array]
 """Component, options of the effect, and the loading of its coefficients."""
 TOLD = 1e-6
-"""Squares of the least of some independent columns, of the largest, that are far from rounding errors."""
+"""Smallest ratio of eigenvalues at which columns are safely independent."""
 SAME_AS_NAME = 0.8
-"""Share of an error's squares, beside what is free, that makes it the same as a name."""
+"""Share of an alternative's squares that a name can show, from which on it is dropped as the same."""
 
 
 CHANGE, CAME = "change of ", "came since: "
-"""Of two dates: how the names begin of what is at the later one only, and their titles."""
+"""Prefixes of name and title of a change between two dates."""
 
 
 @frozen(repr=False, slots=False)
 class VisibleForms:
-    """The groups that the data show, and the candidates that they cannot show, with the share that is left."""
+    """The forms that the data can show, and the candidates that they cannot show, with the visible share of these."""
 
     groups: tuple[EffectForm, ...]
     invisible: tuple[tuple[Candidate, float], ...]
 
 
 def visible_forms(data: ResidualData, candidates: Sequence[Candidate]) -> VisibleForms:
-    """All forms of all candidates that can be seen."""
+    """The visible forms of all candidates."""
     basis = orthonormal(data.base / data.relative[:, None])
     groups: list[EffectForm] = []
     invisible = []
@@ -137,7 +132,7 @@ def visible_forms(data: ResidualData, candidates: Sequence[Candidate]) -> Visibl
 
 
 def file_constants(data: ResidualData) -> tuple[EffectForm, ...]:
-    """What the free constants of the machine file show, each by itself."""
+    """The free constants of the machine file as forms, one for each effect."""
     found = []
     for effect in data.problem.selection.estimated:
         title = f"constant of the machine file: {component_title(effect.name, data.machine.axis(effect.joint))}"
@@ -148,7 +143,7 @@ def file_constants(data: ResidualData) -> tuple[EffectForm, ...]:
 
 
 def changes(data: ResidualData, groups: Sequence[EffectForm], first: int) -> tuple[EffectForm, ...]:
-    """The forms as what came since: they show in the files from number `first` on, and not in those before."""
+    """The forms as changes between two dates: they act in the files from index `first` on only."""
     later = (data.file[np.maximum(data.row, 0)] >= first) & (data.row >= 0)
     basis, found = orthonormal(data.base / data.relative[:, None]), []
     for group in groups:
@@ -162,9 +157,9 @@ def changes(data: ResidualData, groups: Sequence[EffectForm], first: int) -> tup
 
 
 def expansion_loadings(loadings: Sequence[Array]) -> Iterator[Array]:
-    """Loadings of what grows from where it is held: there it stays, so all of it moves by one course.
+    """Loadings of an expansion about each of `HOLD_POINTS`, with the spread of the true fixed point.
 
-    One of `HOLDS` in turn; the true place is somewhere about it.
+    All points of the part move with one course in time.
     """
     for course in loadings:
         about = stacked(np.zeros((len(course), 0)), *[HOLD_SPREAD * course] * 3)
@@ -175,7 +170,7 @@ def expansion_loadings(loadings: Sequence[Array]) -> Iterator[Array]:
 def without_lacking_constants(
     data: ResidualData, parts: Iterable[Array], named: Sequence[EffectForm]
 ) -> Iterator[Array]:
-    """Columns (m, p) in parts without what constants that the machine file lacks would show: that is left to those."""
+    """The parts, columns (m, p) each, without the component that lacking constants of the machine file explain."""
     constants = [group.columns for group in named if group.owner.constant]
     if not constants:
         yield from parts
@@ -186,7 +181,7 @@ def without_lacking_constants(
 
 
 def _form(data: ResidualData, candidate: Candidate, loading: Array, design: Array) -> EffectForm | None:
-    """The form at a size of 1 um, with as few columns as it needs."""
+    """The form scaled to 1 um, with as few columns as it needs; None if it is invisible or has no lever."""
     used = loading.any(axis=1)
     columns = design @ loading if used.all() else design[:, used] @ loading[used]
     size = data.size(columns)
@@ -197,7 +192,7 @@ def _form(data: ResidualData, candidate: Candidate, loading: Array, design: Arra
 
 
 def _lead_squares(candidate: Candidate, loading: Array, design: Array) -> float:
-    """Squares of what the effect itself shows, without what comes with it; all of it where nothing does."""
+    """Squares of the leading effects' part of the columns; infinite if all effects lead."""
     if not candidate.lead:
         return np.inf
     own = slice(0, sum(effect.basis.size for effect in candidate.effects[: candidate.lead]))
@@ -205,7 +200,7 @@ def _lead_squares(candidate: Candidate, loading: Array, design: Array) -> float:
 
 
 def principal_rotation(columns: Array) -> Array:
-    """The rotation (p, r) to as few columns as carry nearly all of their squares."""
+    """The rotation (p, r) to the fewest columns that carry nearly all of the squares."""
     if columns.shape[1] == 1:
         return np.ones((1, 1))
     squares, turned = np.linalg.eigh(columns.T @ columns)
@@ -213,7 +208,7 @@ def principal_rotation(columns: Array) -> Array:
 
 
 def _visible_shares(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> list[float]:
-    """Share of the squares that each form shows, in units of each value's noise, beside an orthonormal basis."""
+    """For each form, the share of its squares that is orthogonal to `basis`, in units of each value's noise."""
     if not groups:
         return []
     columns = np.concatenate([group.columns.T for group in groups]) / data.relative
@@ -223,7 +218,7 @@ def _visible_shares(data: ResidualData, basis: Array, groups: Sequence[EffectFor
 
 
 def _smooth_fields(data: ResidualData) -> Iterator[EffectForm | None]:
-    """All of them; none where the data do not show the tool tip."""
+    """The smooth fields of the tool tip; none if the data do not depend on the tip."""
     tip = data.design([Effect(f"E{letter}{SPINDLE}", (0.0,)) for letter in LETTERS]) / 1e3
     if np.abs(tip).max() > 0:
         rows = np.maximum(data.row, 0)
@@ -234,10 +229,10 @@ def _smooth_fields(data: ResidualData) -> Iterator[EffectForm | None]:
 
 
 def tip_frames(data: ResidualData, tip: Array) -> tuple[Array, ...]:
-    """What a shift of the tip along axes of the tool, of the base and of the workpiece shows, (m, 3) each.
+    """Effect on the values, (m, 3), of a shift of the tip along the axes of tool, base and workpiece.
 
-    Those that are one are there once: tool and base where nothing turns the tool, base and workpiece where nothing
-    turns the workpiece.
+    A frame is left out if it is the same as another: tool and base if no rotary axis turns the tool, base and workpiece
+    if none turns the workpiece.
     """
     sides = [axis.workpiece_side for axis in data.machine.axes if axis.rotary]
     found, row = [tip], np.maximum(data.row, 0)
@@ -251,7 +246,7 @@ def tip_frames(data: ResidualData, tip: Array) -> tuple[Array, ...]:
 
 
 def _kernels(data: ResidualData) -> Iterator[tuple[Candidate, Array]]:
-    """Covariances of rows, (n, n)."""
+    """The alternatives with their covariances between rows, (n, n)."""
     u = scaled_axes(data)
     for length in POSE_LENGTHS:
         yield POSE, _squared_exponential(u, length)
@@ -277,18 +272,18 @@ def _squared_exponential(u: Array, length: float) -> Array:
 
 
 def _directions(data: ResidualData) -> Array:
-    """Directions from which the axes came, those that changed, (n, k)."""
+    """Directions of approach of the axes that were approached from both sides, (n, k)."""
     names = [f"dir_{axis.name}" for axis in data.machine.axes if f"dir_{axis.name}" in data.measured.columns]
     return np.stack([data.column(name) for name in names], axis=-1) if names else np.zeros((data.count, 0))
 
 
 def scaled_axes(data: ResidualData, q: Array | None = None) -> Array:
-    """The axes that moved, -1 ... 1 each; full turns as points of a circle, (n, k). Of the rows, or of positions q."""
+    """Positions of the moved axes scaled to -1 ... 1, (n, k), of the rows or of `q`; full turns as cosine and sine."""
     columns = []
     for index, axis in enumerate(data.machine.axes):
         values = (data.q if q is None else q)[:, index]
         low, high = float(data.q[:, index].min()), float(data.q[:, index].max())
-        if not data.measured.moved(axis) or high == low:  # of a length both ends count for the reach, one is the row's
+        if not data.measured.moved(axis) or high == low:  # `moved` counts both ends of a length, q has one of them
             continue
         if axis.rotary and high - low > 1.5 * np.pi:
             columns += [np.cos(values), np.sin(values)]
@@ -298,7 +293,7 @@ def scaled_axes(data: ResidualData, q: Array | None = None) -> Array:
 
 
 def kernel_functions(kernel: Array, most: int = MOST_FUNCTIONS) -> Array:
-    """Functions (n, k) whose inner products are nearly this covariance."""
+    """Basis functions (n, k) with F F' nearly equal to the covariance `kernel` (n, n), at most `most`."""
     squares, vectors = np.linalg.eigh(kernel)
     squares, vectors = squares[::-1][:most], vectors[:, ::-1][:, :most]
     kept = squares > 1e-6 * squares[0]
@@ -307,12 +302,12 @@ def kernel_functions(kernel: Array, most: int = MOST_FUNCTIONS) -> Array:
 
 
 def shape_variations(data: ResidualData) -> Array:
-    """Smooth functions of each axis and of the time, of variance one together, (m, k)."""
+    """Smooth basis functions of each axis and of the time, with a total variance of one, (m, k)."""
     return _variations(data, scaled_axes(data), data.column("time_s"))[np.maximum(data.row, 0)]
 
 
 def shape_variations_with(data: ResidualData, new: Observation) -> tuple[Array, Array]:
-    """The same functions of the values, (m, k), and of those of further poses, (v, k)."""
+    """`shape_variations` of the values, (m, k), and the same functions for the values of further poses, (v, k)."""
     places = np.concatenate([scaled_axes(data), scaled_axes(data, new.q)])
     time = np.concatenate([data.column("time_s"), new.measurement.column("time_s")])
     both = _variations(data, places, time)
@@ -320,7 +315,7 @@ def shape_variations_with(data: ResidualData, new: Observation) -> tuple[Array, 
 
 
 def _variations(data: ResidualData, places: Array, time: Array) -> Array:
-    """Of rows at scaled places (n, a) and times (n,), (n, k)."""
+    """The functions of `shape_variations` (n, k) for rows at scaled positions (n, a) and times (n,)."""
     known = data.column("time_s")
     signals = [*places.T, *([2 * (time - known.mean()) / np.ptp(known)] if np.ptp(known) > 0 else [])]
     kernel = sum(np.exp(-0.5 * (u[:, None] - u) ** 2 / VARIATION_LENGTH**2) for u in signals) / len(signals)
@@ -328,7 +323,7 @@ def _variations(data: ResidualData, places: Array, time: Array) -> Array:
 
 
 def combined_form(data: ResidualData, owner: Candidate, parts: Sequence[Array]) -> EffectForm | None:
-    """The parts with the same share each, at a size of 1 um together, with as few columns as they need."""
+    """One form of several parts of equal size, scaled to 1 um together, with as few columns as it needs."""
     sizes = [data.size(part) for part in parts]
     count = sum(size > 0 for size in sizes)
     if not count:
@@ -341,7 +336,7 @@ def combined_form(data: ResidualData, owner: Candidate, parts: Sequence[Array]) 
 
 
 def _joint_forms(data: ResidualData) -> Iterator[EffectForm | None]:
-    """Of every joint, by all it may depend on: its six errors with the same share each, and each alone."""
+    """Unnamed errors of every joint, for each input: its six error motions together, and each alone."""
     sorts = [(axis, *sort) for axis in _moved(data.measured) for sort in _sorts(data.measured, axis)]
     parts = [part for _, _, components in sorts for component in components for part in component]
     designs = _designs(data, [zero([Effect(name, (), **options)]) for name, options, _ in parts])
@@ -355,7 +350,7 @@ def _joint_forms(data: ResidualData) -> Iterator[EffectForm | None]:
 
 
 def _designs(data: ResidualData, effects: Sequence[Sequence[Effect]]) -> Iterator[Array]:
-    """What the coefficients of each of several groups of effects show; of some groups at once."""
+    """The design (m, k) of each group of effects, computed in batches."""
     for start in range(0, len(effects), BATCH):
         some = effects[start : start + BATCH]
         every = data.design([effect for group in some for effect in group])
@@ -373,7 +368,7 @@ def _moved(measured: MeasuredRange) -> tuple[Axis, ...]:
 
 
 def _sorts(measured: MeasuredRange, axis: Axis) -> Iterator[tuple[str, list[list[JointPart]]]]:
-    """What each component may do: by position, direction, another axis, time."""
+    """The inputs on which errors of an axis may depend, each with the parts of its six components."""
     names = [f"E{letter}{axis.name}" for letter in LETTERS + TURNS]
     options, loading = _curve(measured, axis)
     yield "its position", [[(name, options, _curved(axis, name, loading))] for name in names]
@@ -397,12 +392,12 @@ def _curve(measured: MeasuredRange, axis: Axis) -> tuple[dict[str, Any], Array]:
 
 
 def _curved(axis: Axis, name: str, loading: Array) -> Array:
-    """Without what is straight in a shift: that is where the axis lies, or its gain, and has a name of its own."""
+    """The loading, for shifts of a linear axis without mean and slope, which are location errors and gains."""
     return loading if axis.rotary or name[1] in TURNS else bent_loading(JOINT_BEND)
 
 
 def _warm(measured: MeasuredRange) -> list[tuple[dict[str, Any], Array]]:
-    """Time and temperatures as options of effects."""
+    """Options and loadings of effects of time and temperatures."""
     found: list[tuple[dict[str, Any], Array]] = []
     if "time_s" in measured.columns:
         first, last = measured.clock
@@ -415,15 +410,15 @@ def _warm(measured: MeasuredRange) -> list[tuple[dict[str, Any], Array]]:
 
 
 def _loaded(measured: MeasuredRange) -> list[tuple[dict[str, Any], Array]]:
-    """The load as an option of effects."""
+    """Options and loading of effects of the load."""
     options = {"basis": Polynomial(degree=(1,)), "input": "load_kg", "center": 0.0, "scale": 100.0}
     return [(options, np.eye(1))] if "load_kg" in measured.columns else []
 
 
 def unnamed_alternatives(data: ResidualData, named: Sequence[EffectForm]) -> tuple[EffectForm, ...]:
-    """All of them, several forms each; none where the data do not show the tool tip.
+    """All unnamed alternatives; none if the data do not depend on the tool tip.
 
-    What a constant that the machine file lacks would show is left to that: a rival has no part in it.
+    The component that a lacking constant explains is removed from them.
     """
     anywhere = list(_smooth_fields(data))
     found = [group for group in (*anywhere, *(_joint_forms(data) if anywhere else ())) if group is not None]
@@ -436,7 +431,7 @@ def unnamed_alternatives(data: ResidualData, named: Sequence[EffectForm]) -> tup
 def _not_in_catalogue(
     data: ResidualData, groups: Sequence[EffectForm], named: Sequence[EffectForm]
 ) -> list[EffectForm]:
-    """Without the single errors that a name holds already: those are that name with another shape, or course."""
+    """The alternatives without single errors that a name can show: these are that name with another shape."""
     basis = orthonormal(data.base / data.relative[:, None])
     single = [(group, errors) for group in groups if (errors := _errors(group))]
     wanted = set().union(*(errors for _, errors in single))
@@ -454,7 +449,7 @@ def _not_in_catalogue(
 
 
 def _beside(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> Iterator[Array]:
-    """What each form shows beside an orthonormal basis of what is free, in units of each value's noise."""
+    """The columns of each form orthogonal to `basis`, in units of each value's noise."""
     for start in range(0, len(groups), BATCH):
         some = groups[start : start + BATCH]
         columns = side_by_side(group.columns for group in some) / data.relative[:, None]
@@ -462,7 +457,7 @@ def _beside(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> I
 
 
 def _span(columns: Array) -> Array:
-    """An orthonormal basis of what columns span; by their inner products where these are well told apart."""
+    """An orthonormal basis of the span of columns; by their Gram matrix if that is well conditioned."""
     squares, turned = np.linalg.eigh(columns.T @ columns)
     if squares[0] > TOLD * squares[-1]:
         return np.asarray(columns @ (turned / np.sqrt(squares)))
@@ -470,7 +465,7 @@ def _span(columns: Array) -> Array:
 
 
 def _largest_shown(parts: Sequence[NDArray[np.float32]], by: Sequence[NDArray[np.float32]]) -> list[float]:
-    """Of the squares of each part those that one orthonormal basis can show, the largest."""
+    """For each part, the squares that the best of several orthonormal bases can show."""
     if not by:
         return [0.0] * len(parts)
     squares = (np.concatenate(by, axis=1).T @ np.concatenate(parts, axis=1)) ** 2
@@ -481,5 +476,5 @@ def _largest_shown(parts: Sequence[NDArray[np.float32]], by: Sequence[NDArray[np
 
 
 def _errors(group: EffectForm) -> set[str]:
-    """The errors it consists of; and the course of time if it is nothing but one, wherever it acts."""
+    """Names of the errors of a form's effects; with "slow" if these depend on time and temperatures only."""
     return {effect.name for effect in group.owner.effects} | ({"slow"} if group.owner.slow else set())

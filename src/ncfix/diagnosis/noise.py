@@ -1,18 +1,17 @@
-"""How much the instrument wanders, and the background that goes with that.
+"""Noise, drift of the instrument and outliers: the background of the evidence, and the noise floor of the report.
 
-A drift of hours looks like an instrument that wanders, as long as nothing else may explain it, and a wandering of that
-size then hides the drift. So each size of the wandering is weighed together with the names that act in the course of
-time and nothing else: the likeliest one after another, at the price of a name, as long as they pay. The course of a
-real effect is never quite what the catalogue says (`MISSHAPEN`), and what a name misses of it wanders, too.
+Drift of the instrument. A thermal drift of the machine looks like a drift of the instrument, which would then hide it.
+So each size of the instrument's drift is weighed together with the names that act in time only, added one after another
+as long as they pay the price of a name. A real effect never quite has the catalogue's course (`MISSHAPEN`); what a name
+misses counts as drift of the instrument.
 
-Values that neither the model nor any smooth effect explains: found by leaving each one out.
+Outliers are found by predicting each value from all others. The model is the base with a generous background of small
+effects, so that real effects make no outliers. Very large effects still do; so if more rows stand out than instruments
+fail, the likeliest effect is added and the test repeated. Rows beyond `GROSS` are put aside and reported; those beyond
+`TAIL` get less weight, for long tails of the noise.
 
-The model that is asked is the base with a generous amount of everything, so that an effect that is really there makes
-no outliers. One that is many times the noise makes them all the same; so where more rows stand out than instruments
-fail, the effect that explains the data best is taken to be there as well, and it is asked again. Rows beyond `GROSS`
-are put aside and named; those beyond `TAIL` count less (long tails of the noise).
-
-How large the noise is, from what, and whether anything is left beyond it.
+The noise floor comes from repeats, from the file, or from neighbouring poses; the excess of the residual over it is
+tested.
 """
 
 from __future__ import annotations
@@ -45,71 +44,73 @@ from ncfix.measure.measurement import Measurement, groups
 from ncfix.values import frozen
 
 DRIFT_SIZES = (0.0, 0.15, 0.35, 0.7)
-"""How large an instrument's wandering may be against the noise."""
+"""Sizes of the instrument's drift that are considered, in units of the noise."""
 ROWS = 256
-"""Values of which a product of all with all is made at once."""
+"""Rows of a large matrix product that are computed at once, to limit memory."""
 EVERYTHING_SHARE = 0.35
-"""Size of everything else together, against the noise, while it is asked how much the instrument wanders."""
+"""Size of the background of small effects, in units of the noise, while the drift is estimated."""
 MOST_COURSES = 4
-"""Names that are added at most."""
+"""Largest number of names that are added to explain a drift."""
 UNKNOWN_NOISE = 1.0
-"""Degrees of freedom of what is known of the noise where nothing is."""
+"""Degrees of freedom of the prior noise if no file states it."""
 STATED_NOISE = 200.0
-"""The same where the header of a file states it."""
+"""The same if all files state it."""
 GROSS, TAIL = 5.0, 3.0
+"""Standard deviations from which on a value is an outlier, and from which on it gets less weight."""
 GENEROUS_SHARE = 2.5
-"""Size of everything, against the noise, that may be there."""
+"""Size of the background of small effects, in units of the noise, in the search for outliers."""
 ASIDE = 1e3
-"""Factor on the standard deviation of what is put aside."""
+"""Factor on the standard deviation of outliers."""
 FAILED = 0.02
-"""Share of the rows that an instrument may spoil; where more stand out, an effect may be why. What drives do for a
-moment only may be why in any case."""
+"""Share of the rows that an instrument may spoil; if more stand out, an effect may be the reason. Brief effects of the
+drives may be the reason in any case."""
 LARGE = 8.0
-"""The sizes of effects times this, in noise, are those of effects that make rows stand out."""
+"""Factor on the considered sizes of effects, for effects large enough to make rows stand out."""
 LIKELY = 10.0
 """Log odds that such an effect must have."""
 MOST_EFFECTS = 5
-"""So many of them at most."""
+"""Largest number of such effects."""
 TAILS = 2.0
-"""Variance of a standard deviation from repeats, times their freedom, over its square: Student's t with 5 degrees."""
+"""Relative variance of a standard deviation from repeats, times its freedom, for Student's t with 5 degrees."""
 TRUSTED = 0.1
-"""How far a noise that was given may be off."""
+"""Relative uncertainty of a stated noise."""
 USUAL_UM = 1.0
-"""rms of the little of everything that all machining centres of a metre have."""
+"""Size of the small effects that every machining centre of one metre has, um rms."""
 ASTRAY = 5.0
-"""Standard deviations beyond which a repeat is not noise."""
+"""Standard deviations beyond which a repeat is an outlier."""
 ENOUGH_REPEATS = 10
-"""Degrees of freedom of repeats from which on they say something."""
+"""Degrees of freedom of repeats from which they determine the noise."""
 
 
 @frozen(repr=False, slots=False)
 class Contrasts:
-    """An orthonormal basis of what is orthogonal to the base, (m, n), as the last columns of 1 - V T V': of the
-    reflections that make it V (m, k) are the vectors, and T (k, k) is what makes one product of them.
+    """An orthonormal basis (m, n) of the complement of the base: the last columns of 1 - V T V'.
+
+    vectors  V (m, k), the Householder vectors of the base; joined: T (k, k) of their compact product
     """
 
     vectors: Array
     joined: Array
 
     def seen(self, values: Array) -> Array:
-        """Columns of values (m, p) as contrasts, (n, p); far quicker by a few reflections."""
+        """Values (m, p) transformed to contrasts, (n, p)."""
         k = self.vectors.shape[1]
         return values[k:] - self.vectors[k:] @ (self.joined.T @ (self.vectors.T @ values))
 
     def values(self, contrasts: Array) -> Array:
-        """Columns of values (m, p) that have these contrasts (n, p) and nothing of the base."""
+        """Contrasts (n, p) transformed to values, (m, p), orthogonal to the base."""
         k = self.vectors.shape[1]
         found = -self.vectors @ (self.joined @ (self.vectors[k:].T @ contrasts))
         found[k:] += contrasts
         return found
 
     def of(self, covariance: Array) -> Array:
-        """The covariance (m, m) of values as one of contrasts, (n, n)."""
+        """A covariance of values (m, m) transformed to contrasts, (n, n)."""
         return self.seen(self.seen(covariance).T)
 
 
 def error_contrasts(base: Array) -> Contrasts:
-    """The contrasts of what is free."""
+    """The contrasts orthogonal to the columns of `base` (m, k)."""
     size = np.linalg.norm(base, axis=0)
     scaled = base[:, size > 0] / size[size > 0]
     basis = orthonormal(scaled)
@@ -123,9 +124,9 @@ def error_contrasts(base: Array) -> Contrasts:
 
 
 def everything_covariance(data: ResidualData, named: Sequence[EffectForm]) -> Array:
-    """The covariance of a little of every candidate, of 1 um together, each name with the same share, um^2, (m, m).
+    """Covariance (m, m), um^2, of "everything": all names with equal shares, 1 um together.
 
-    But nothing of the constants that the machine file lacks: those are looked for, not taken for granted.
+    Constants that the machine file lacks are not part of it: they are sought, not assumed.
     """
     covariance, parts = np.zeros((len(data.y), len(data.y))), _everything(named, (group.columns for group in named))
     for columns in without_lacking_constants(data, parts, named):
@@ -134,9 +135,9 @@ def everything_covariance(data: ResidualData, named: Sequence[EffectForm]) -> Ar
 
 
 def everything_at(data: ResidualData, named: Sequence[EffectForm], ahead: Sequence[Array]) -> tuple[Array, Array]:
-    """As `everything_covariance`, of v values at further poses: (v, v), and with the old values, (v, m).
+    """As `everything_covariance`, for v values at further poses: (v, v), and with the old values, (v, m), um^2.
 
-    ahead  (v, p) um, what each form shows there
+    ahead  for each form its effect on the further values, (v, p) um
     """
     new = side_by_side([np.zeros((len(ahead[0]) if ahead else 0, 0)), *_everything(named, ahead)])
     old = side_by_side([np.zeros((len(data.y), 0)), *_everything(named, (group.columns for group in named))])
@@ -150,7 +151,7 @@ def everything_at(data: ResidualData, named: Sequence[EffectForm], ahead: Sequen
 
 
 def _everything(named: Sequence[EffectForm], shown: Iterable[Array]) -> Iterator[Array]:
-    """Columns (count, p) of a little of every name, in parts: what each form shows, each name with the same share."""
+    """Columns of "everything" in batches: those of each form (`shown`), scaled so that names have equal shares."""
     forms = Counter(group.owner.name for group in named if not group.owner.constant)
     kept = ((group.owner, own) for group, own in zip(named, shown, strict=True) if not group.owner.constant)
     parts = (own / np.sqrt(forms[owner.name] * len(forms)) for owner, own in kept)
@@ -161,7 +162,7 @@ def _everything(named: Sequence[EffectForm], shown: Iterable[Array]) -> Iterator
 def estimated_background(
     data: ResidualData, everything: Array, relative: Array, named: Sequence[EffectForm] = ()
 ) -> Background:
-    """Estimate how much the instrument wanders, where these names may act besides, and find the coordinates."""
+    """The background with the likeliest drift of the instrument; `named`: forms that may explain a drift instead."""
     sigma, freedom = _noise(data)
     free = error_contrasts(data.base / relative[:, None])
     inner = free.of(in_noise(everything, relative))
@@ -174,7 +175,7 @@ def estimated_background(
         )
         noise *= drift**2
         noise[np.diag_indices_from(noise)] += 1.0
-    # both are symmetric: turned over they are worked on where they stand
+    # both are symmetric: their transposes are Fortran-ordered, so LAPACK works in place
     if drift:
         spectrum, vectors = eigh(inner.T, noise.T, driver="gvd", overwrite_a=True, overwrite_b=True)
     else:
@@ -185,19 +186,19 @@ def estimated_background(
 
 
 def _noise(data: ResidualData) -> tuple[float, float]:
-    """Noise of a plain value, um, and how well it is known."""
+    """Prior noise of a usual value, um, and its degrees of freedom."""
     return data.sigma, STATED_NOISE if data.noise_stated else UNKNOWN_NOISE
 
 
 @frozen(repr=False, slots=False)
 class DriftLikelihood:
-    """How much does it wander?
+    """Likelihood of the size of the instrument's drift.
 
     free        contrasts, n of m values
     scale       (m,) standard deviations of the values, um
     y           (m,) the values, um
-    everything  (n, n) covariance of a little of everything at 1 um; slow: of the wandering at the size of the noise
-    freedom     of what is known of the noise
+    everything  (n, n) covariance of "everything" at 1 um; slow: of the drift at the size of the noise
+    freedom     degrees of freedom of the prior noise
     """
 
     free: Contrasts
@@ -208,13 +209,13 @@ class DriftLikelihood:
     freedom: float
 
     def likelihood(self, size: float) -> float:
-        """Log likelihood of the data with a wandering of this size, that of the noise integrated out."""
+        """Log likelihood of the data with a drift of this size (in units of the noise)."""
         white, determinant = self.white(size, [])
         return marginal(float(white[:, 0] @ white[:, 0]), determinant, len(white), self.freedom)
 
     def white(self, size: float, groups: Sequence[EffectForm]) -> tuple[Array, float]:
-        """Contrasts of the data and of the columns of some forms, in units of each value's noise, where noise,
-        everything and such a wandering are one, (n, 1 + p); and the log determinant of the covariance of these.
+        """Contrasts of the data and of the columns of some forms, (n, 1 + p), whitened by noise, background and a drift
+        of this size; and the log determinant of that covariance.
         """
         covariance = size**2 * self.slow
         covariance += EVERYTHING_SHARE**2 * self.everything
@@ -229,7 +230,7 @@ class DriftLikelihood:
 
 
 def _likeliest_drift(asked: DriftLikelihood, named: Sequence[EffectForm], sizes: Sequence[float]) -> float:
-    """The size that explains most; with names no more of it than without, and no less than what their courses miss."""
+    """The likeliest size of the drift: no larger with names than without, no smaller than what their courses miss."""
     plain = [asked.likelihood(size) for size in DRIFT_SIZES]
     most = int(np.argmax(plain)) + 1
     courses = [group for group in named if group.owner.slow]
@@ -244,8 +245,9 @@ def _likeliest_drift(asked: DriftLikelihood, named: Sequence[EffectForm], sizes:
 def _beside_names(
     white: Array, freedom: float, courses: Sequence[EffectForm], named: Sequence[EffectForm], sizes: Sequence[float]
 ) -> tuple[float, float]:
-    """How much log likelihood names that act by time alone add to a wandering, less what they pay; and how much the
-    largest shows, um rms. `white` are the data and the columns of those names, (n, 1 + p).
+    """Gain of log likelihood, less prices, by names that act in time only; and the size of the largest one, um rms.
+
+    white  (n, 1 + p) the whitened data and columns of `courses`, the forms of those names
     """
     forms = Counter(group.owner.name for group in named)
     prices = np.log([len(forms) * forms[group.owner.name] * len(sizes) for group in courses])
@@ -268,15 +270,16 @@ def _beside_names(
 
 
 def _taken(weighed: Array, columns: Array) -> Array:
-    """A (m, k): beside columns (m, k) that are there at unit size, `weighed` by a precision, that is less by A A'."""
+    """A (m, k), such that adding columns of unit variance reduces the precision P by A A'; `weighed` is P columns."""
     factor = cholesky(np.eye(columns.shape[1]) + columns.T @ weighed, lower=True, check_finite=False)
     return np.asarray(solve_triangular(factor, weighed.T, lower=True, check_finite=False).T)
 
 
 def downweighted(data: ResidualData, everything: Array, groups: Sequence[EffectForm]) -> tuple[Array, Mask]:
-    """Standard deviations against that of a plain value with outliers put aside, and which rows those are, (rows,).
+    """Relative standard deviations (m,) with outliers downweighted, and a mask (rows,) of the rows put aside.
 
-    `everything` is the covariance of a little of everything, um^2; `groups` are all effects that may be there.
+    everything  (m, m) covariance of "everything" at 1 um, um^2
+    groups      forms of all effects that may be there
     """
     plain = PlainModel.of(data, everything)
     beside = np.zeros((len(data.y), 0))
@@ -295,11 +298,11 @@ def downweighted(data: ResidualData, everything: Array, groups: Sequence[EffectF
 
 @frozen(repr=False, slots=False)
 class PlainModel:
-    """The base, noise and a generous amount of everything; what is there besides enters by its columns.
+    """The model of the outlier test: base, noise and a generous background; further effects enter as columns.
 
-    y          (m,) the values, in units of each value's noise, as all that follows
-    precision  (m, m) the inverse of the covariance with the base free
-    inner      with it, of forms, or of those that drives may show, from some number on, each computed once
+    y          (m,) the values, in units of each value's noise
+    precision  (m, m) inverse covariance with the base free, in the same units
+    inner      cache: (forms of drives only, index of the first form of a batch) -> weighted inner products
     """
 
     data: ResidualData
@@ -309,21 +312,21 @@ class PlainModel:
 
     @classmethod
     def of(cls, data: ResidualData, everything: Array) -> PlainModel:
-        """With everything's covariance (m, m) at 1 um, um^2."""
+        """The model for data with the covariance (m, m) of "everything" at 1 um, um^2."""
         base = orthonormal(data.base / data.relative[:, None])
         precision = inverse(with_noise(everything, GENEROUS_SHARE, data.relative))
         solved = precision @ base
         known = np.linalg.solve(base.T @ solved, solved.T)
-        for start in range(0, len(precision), ROWS):  # some at a time take less memory
+        for start in range(0, len(precision), ROWS):
             precision[start : start + ROWS] -= solved[start : start + ROWS] @ known
         return cls(data, data.y / data.relative, precision)
 
     def less(self, beside: Array) -> Array:
-        """A (m, k): beside columns (m, k) that are there at unit size the precision is less by A A'."""
+        """A (m, k), such that adding columns `beside` (m, k) of unit variance reduces the precision by A A'."""
         return _taken(self.precision @ beside, beside)
 
     def leave_one_out(self, beside: Array) -> Array:
-        """For every value: what it is, minus what all others predict of it, over its standard deviation; (m,)."""
+        """Each value minus its prediction from all others, over its standard deviation, (m,); robustly scaled."""
         less = self.less(beside)
         solved = self.precision @ self.y - less @ (less.T @ self.y)
         z = solved / np.sqrt(np.maximum(np.diag(self.precision) - (less**2).sum(axis=1), 1e-12))
@@ -331,10 +334,12 @@ class PlainModel:
         return np.asarray(z / (spread or 1.0))
 
     def likeliest_effect(self, groups: Sequence[EffectForm], dynamic: bool, beside: Array, wide: Array) -> Array | None:
-        """The likeliest effect of all, or of what drives may show, in its likeliest size, and what it may differ in
-        shape: columns (m, k); None if none is likely.
+        """Columns (m, k) of the likeliest effect at its likeliest size, with changes of its shape; None if none is
+        likely.
 
-        Values count less as their noise is `wide`: what stands out for other reasons shall not bring an effect.
+        dynamic  consider effects of the drives only
+        beside   columns of the effects already there
+        wide     (m,) factor on the noise of values that stand out, so that single outliers bring no effect
         """
         some = [group for group in groups if group.owner.dynamic or not dynamic]
         doubtful = np.flatnonzero(wide > 1)
@@ -361,7 +366,7 @@ class PlainModel:
         return np.concatenate([found, MISSHAPEN * shown[:, None] * shape_variations(self.data)], axis=1)
 
     def _inner(self, dynamic: bool, start: int, columns: Array, bounds: Sequence[int]) -> Blocks:
-        """Of the forms from number `start` on; computed once."""
+        """Weighted inner products of the batch of forms from index `start` on; cached."""
         key = dynamic, start
         if key not in self.inner:
             parts = (np.split(each, bounds[1:-1], axis=1) for each in (columns, self.precision @ columns))
@@ -370,7 +375,7 @@ class PlainModel:
 
 
 def _standing_out(data: ResidualData, z: Array) -> Mask:
-    """Rows with a value beyond `GROSS`."""
+    """Mask of the rows with a value beyond `GROSS` standard deviations."""
     gross = np.zeros(data.count, dtype=bool)
     gross[data.row[(z > GROSS) & (data.row >= 0)]] = True
     return gross
@@ -380,7 +385,7 @@ def _standing_out(data: ResidualData, z: Array) -> Mask:
 class NoiseFloor:
     """The noise floor.
 
-    sigma_um  standard deviation of one value
+    sigma_um  standard deviation of a usual value, um
     source    repeats, given, or neighbours (what smooth effects leave)
     freedom   degrees of freedom
     squares   sum of squares of the repeats about their means, um^2
@@ -393,7 +398,7 @@ class NoiseFloor:
 
 
 def noise_floor(data: ResidualData, background: Background, sigma_um: float, keep: Mask) -> NoiseFloor:
-    """From repeats if there are enough, else as given, else as estimated from neighbouring poses."""
+    """The noise floor from repeats if there are enough, else as stated, else as estimated with the fit (`sigma_um`)."""
     squares, freedom = repeat_scatter(data, keep)
     if freedom >= ENOUGH_REPEATS:
         return NoiseFloor(float(np.sqrt(squares / freedom)), "repeats", freedom, squares)
@@ -403,10 +408,10 @@ def noise_floor(data: ResidualData, background: Background, sigma_um: float, kee
 
 
 def beyond_noise(data: ResidualData, noise_floor: NoiseFloor, noise: Array, left: Array, keep: Mask) -> float:
-    """What is left beyond the noise (m,) and what machines have of everything, um rms, in the rows of the worst sort.
+    """Excess of the residual `left` (m,) over the noise (m,) and the usual small effects, um rms, worst sort of rows.
 
-    Noise that comes from repeats with long tails is known to two standard deviations only, a given one to a tenth, and
-    no better than so many rows tell it.
+    The noise is increased by its uncertainty: two standard deviations of that from repeats (with long tails), a tenth
+    if it was stated, and at least what the number of rows allows.
     """
     known = 2 * np.sqrt(TAILS / noise_floor.freedom) if noise_floor.freedom else TRUSTED
     counts = np.bincount(data.views[keep], minlength=data.views.max(initial=0) + 1)
@@ -417,8 +422,9 @@ def beyond_noise(data: ResidualData, noise_floor: NoiseFloor, noise: Array, left
 
 
 def repeat_scatter(data: ResidualData, keep: Mask) -> tuple[float, int]:
-    """Sum of squares of plain values about the means of those taken at one commanded state one after another, um^2, and
-    its freedom.
+    """Sum of squares, um^2, of repeats about their means, and its degrees of freedom.
+
+    Repeats are values of one quantity taken one after another at one commanded state.
     """
     same = states(data.measurements)
     keys = [
@@ -443,7 +449,7 @@ def repeat_scatter(data: ResidualData, keep: Mask) -> tuple[float, int]:
 
 
 def states(measurements: Sequence[Measurement]) -> list[int]:
-    """Number of the commanded state of each row; rows of one state follow one another, but in a test of drift."""
+    """Index of the commanded state of each row. Consecutive equal rows share it, except in a test of drift."""
     seen: list[int] = []
     number, before = -1, None
     for each in measurements:
@@ -458,9 +464,10 @@ def states(measurements: Sequence[Measurement]) -> list[int]:
 
 
 def lack_of_fit(noise_floor: NoiseFloor, residual: Array, parameters: float) -> float | None:
-    """How likely residuals so much larger than the noise are by chance; None without repeats or a given noise.
+    """Probability by chance of residuals so much larger than the noise; None without repeats or a stated noise.
 
-    residual  um, each by how many times its noise is that of a plain value
+    residual    um, each divided by its relative standard deviation
+    parameters  number of fitted parameters
     """
     n = len(residual)
     squares = float((residual**2).sum())

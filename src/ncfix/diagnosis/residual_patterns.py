@@ -1,7 +1,7 @@
-"""Where model and measurement disagree: the largest patterns of the residual, in words.
+"""The largest patterns of the residual in words, for the report, and the clustering of residuals.
 
-Each pattern is one function of the state for one measured component: a slope, a bow, a wave, a direction, a direction
-that grows along an axis, time, a temperature, a tool. They only show; they do not decide.
+A pattern is a function of the state for one measured component: a slope, a bow, a wave, a direction, a direction that
+grows along an axis, time, a temperature, a tool. Patterns do not affect the verdict.
 """
 
 from __future__ import annotations
@@ -18,16 +18,18 @@ from ncfix.measure.least_squares import orthonormal, without
 from ncfix.values import frozen
 
 SHOWN = 6
+"""Largest number of patterns."""
 UNLIKELY = 1e-3
+"""Probability by chance above which a pattern is not shown."""
 NEARLY = 0.99
 """Share of the largest gain at which a simpler pattern is preferred."""
-NEAR, BLOCK = 6, 500
-"""Neighbours of a pose, and poses whose neighbours are sought together."""
+NEIGHBOURS, BLOCK = 6, 500
+"""Number of nearest poses that are compared with each pose; poses for which these are sought at once."""
 
 
 @frozen(slots=False)
 class ResidualPattern:
-    """One pattern: in words, its size (rms, um) and how unlikely it is by chance, all looked at considered."""
+    """One pattern: in words, its size (um rms) and its probability by chance among all patterns considered."""
 
     text: str
     rms_um: float
@@ -35,10 +37,10 @@ class ResidualPattern:
 
 
 def patterns(background: Background, sigma_um: float) -> list[ResidualPattern]:
-    """The largest ones, those that explain the same left out.
+    """The largest patterns, each beside those found before.
 
-    Each is judged by what the others leave, noise or not: beside a large error of another shape some pattern fits a
-    little by chance, however small the noise.
+    Each is tested against the remaining residual, not only the noise: beside a large error of another shape some
+    pattern always fits a little.
     """
     data = background.data
     weight = 1 / background.relative
@@ -49,7 +51,7 @@ def patterns(background: Background, sigma_um: float) -> list[ResidualPattern]:
     while len(found) < SHOWN and offered:
         gains = [(_gain(basis, y, column * weight), text, column * weight) for text, column in offered]
         most = max(gain for (gain, _), _, _ in gains)
-        # simple ones come first: a product of which one factor stands still is no pattern of its own
+        # simple patterns come first: a product with a nearly constant factor is the simple one
         (best, size), text, column = next(each for each in gains if each[0][0] >= NEARLY * most)
         usual = max(sigma_um**2, float(y @ y) / max(len(y) - basis.shape[1], 1))
         p = min(1.0, len(offered) * float(chdtrc(1, best / usual)))
@@ -73,12 +75,12 @@ def _gain(basis: Array, y: Array, column: Array) -> tuple[float, float]:
 
 
 def _signed(size: float, um: float) -> str:
-    """A size in um; of an angle, of which 1 rad is more um than 1 mm is, in urad."""
+    """A size as text: in um for a length (`um` = 1000 per mm), else in urad for an angle (`um` per rad)."""
     return f"{size:+.1f} um" if um == 1e3 else f"{1e6 * size / um:+.1f} urad"
 
 
 def _offered(data: ResidualData) -> Iterator[tuple[str, Array]]:
-    """(words with a place for the size, column) of everything that is looked at."""
+    """All patterns considered: (text with a placeholder for the size, column)."""
     names = list(dict.fromkeys(name for name, row in zip(data.names, data.row, strict=True) if row >= 0))
     for text, feature in _features(data):
         for name in names:
@@ -125,12 +127,12 @@ def _features(data: ResidualData) -> Iterator[tuple[str, Array]]:
 
 
 def clustering(background: Background, residual: Array, places: Array) -> float:
-    """Moran's I of neighbouring poses: 0 for residuals that do not know of their neighbours, 1 for equal ones.
+    """Moran's I of neighbouring poses: 0 for independent residuals, 1 for equal neighbours.
 
     residual (m,) um; places (n, k) of the rows. Source: Moran, "Notes on continuous stochastic phenomena" (1950).
     """
     data = background.data
-    if data.count <= NEAR + 1:
+    if data.count <= NEIGHBOURS + 1:
         return 0.0
     near = np.concatenate([_nearest(places, part) for part in np.array_split(places, -(-len(places) // BLOCK))])
     total, count, square = 0.0, 0, 0.0
@@ -141,13 +143,13 @@ def clustering(background: Background, residual: Array, places: Array) -> float:
         known = np.isfinite(value[near]).all(axis=1)
         products = value[near[known, :1]] * value[near[known, 1:]]
         total, count = total + float(products.sum()), count + products.size
-        square += float((value[known] ** 2).sum()) * NEAR
+        square += float((value[known] ** 2).sum()) * NEIGHBOURS
     return total / square if count and square else 0.0
 
 
 def _nearest(places: Array, part: Array) -> Ints:
-    """The places (n, k) nearest to each of some of them (p, k), itself the first: (p, NEAR + 1)."""
+    """Indices (p, NEIGHBOURS + 1) of the places (n, k) nearest to each of `part` (p, k), itself first."""
     apart = (places**2).sum(axis=1) - 2 * part @ places.T
-    nearest = np.argpartition(apart, NEAR, axis=1)[:, : NEAR + 1]
+    nearest = np.argpartition(apart, NEIGHBOURS, axis=1)[:, : NEIGHBOURS + 1]
     order = np.argsort(np.take_along_axis(apart, nearest, axis=1), axis=1, kind="stable")
     return np.take_along_axis(nearest, order, axis=1)
