@@ -16,7 +16,7 @@ __all__ = ["Candidate", "MeasuredRange", "catalogue", "plain", "without"]
 
 
 def catalogue(measured: MeasuredRange) -> tuple[Candidate, ...]:
-    """Every effect with a name that this machine may have, those of plugins too.
+    """All named effects that this machine may have, including those of plugins.
 
     A plugin's effect (hook `register_effects`) with a method `candidates(measured)` brings candidates of its own.
     """
@@ -33,7 +33,7 @@ def catalogue(measured: MeasuredRange) -> tuple[Candidate, ...]:
 
 
 def without(candidates: Sequence[Candidate], names: Sequence[str]) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:
-    """The candidates but for those named, and the names that none of them has. Case, blank and hyphen do not count."""
+    """The candidates without those in `names`, and the unknown names. Case, blanks, hyphens and _ do not matter."""
     refused = {plain(name): name for name in names}
     kept = tuple(candidate for candidate in candidates if plain(candidate.name) not in refused)
     there = {plain(candidate.name) for candidate in candidates}
@@ -41,5 +41,5 @@ def without(candidates: Sequence[Candidate], names: Sequence[str]) -> tuple[tupl
 
 
 def plain(name: str) -> str:
-    """A name as it is compared."""
+    """A name normalized for comparison: lower case, single blanks for blanks, hyphens and underscores."""
     return re.sub(r"[\s_-]+", " ", name).strip().lower()

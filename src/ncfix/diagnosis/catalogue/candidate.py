@@ -1,10 +1,8 @@
-"""A candidate: a named physical effect as a group of functions with a prior on their coefficients.
+"""A candidate: a named physical effect with priors on its coefficients; and the priors of smooth and periodic shapes.
 
-A group is never cut into columns: a curve, a set of harmonics, a sag with its slope is one candidate. Its coefficients
-are `loading @ z`, z independent with variance one, so a loading carries what the physics says about them: how smooth a
+A candidate is a group of functions that is selected as a whole: a curve, a set of harmonics, a sag with its slope. Its
+coefficients are `loading @ z`, with z independent and of variance one. A loading expresses the physics: how smooth a
 curve is, how harmonics decay, which rotation comes with a deflection. Several loadings are several forms of one name.
-
-Shapes: bases with priors on their coefficients. A curve is smooth, harmonics decay, play grows along the travel.
 """
 
 from __future__ import annotations
@@ -25,32 +23,33 @@ from ncfix.values import frozen
 LETTERS = "XYZ"
 TURNS = "ABC"
 UNTOUCHED_MM, UNTOUCHED_DEG = 1.0, 5.0
-"""An axis that moves less than this was not measured."""
+"""An axis whose positions span less than this counts as not moved."""
 PIECES = 14
-"""Pieces of a spline over what was measured: bends down to a seventh of the travel."""
+"""Pieces of a spline over the measured travel: resolves bends down to a seventh of it."""
 SMOOTH = (0.18, 0.4, 0.9)
-"""Distances, of half the travel, over which a curve bends: wear, a scale's or guide's own shape, a bow."""
+"""Correlation lengths of a curve, in units of half the travel: of wear, the shape of a scale or guide, a bow."""
 HARMONICS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.03, 0.02, 0.01)
-"""Variance of the orders of an error that repeats with a turn."""
+"""Variances of orders 1, 2, ... of a periodic error."""
 LOST = (1.0, 0.15, 0.1)
-"""Variance of play: constant, growing, bowed along the travel."""
+"""Variances of a play's constant, linear and quadratic part along the travel."""
 
 
 @frozen(repr=False, slots=False)
 class Candidate:
     """A physical effect that may be missing.
 
-    name      as it is reported; `kind` is its first words, `axis` the letter of the axis it belongs to, or ""
-    title     in words
-    family    effects of one family are next of kin: one may stand for another
-    effects   what it adds to a machine file, zero until estimated
-    loadings  each (k, p) for the k coefficients of all effects: forms of the effect
+    name      as reported: the kind of effect, then the axis
+    title     description in words
+    axis      letter of the axis to which it belongs, or ""
+    family    related effects, which may imitate one another, have the same family
+    effects   effects that it adds to a machine file, zero until estimated
+    loadings  one (k, p) for each form of the effect, for the k coefficients of all effects
     needs     state columns without which it cannot be seen
     remedy    what can be done about it besides compensation, in words
-    grows     it belongs to the measurement: what stands on the table expands; `effects` then only say what drives it
-    lead      how many of the effects are the effect itself, the rest only comes with it; 0: all
-    constant  a constant of the machine that its file does not have: it goes before all that is not one
-    dynamic   it is of the drives while axes move: where they stand it is not there
+    grows     an expansion of the part on the table, no error of the machine; `effects` then give its course only
+    lead      number of leading effects; the others only accompany them; 0: all lead
+    constant  a constant that the machine file lacks, which is selected before other effects
+    dynamic   an error of the drives while axes move, absent at standstill
     """
 
     name: str
@@ -68,24 +67,24 @@ class Candidate:
 
     @property
     def kept_out(self) -> bool:
-        """Whether nothing of it is added to a machine file."""
+        """Whether it adds nothing to a machine file."""
         return self.grows or self.dynamic
 
     @property
     def slow(self) -> bool:
-        """Whether it is nothing but a course of time, wherever it acts."""
+        """Whether all of its effects depend on time or temperature, and so may look like drift of the instrument."""
         signals = [effect.input or "" for effect in self.effects]
         return bool(signals) and all(signal == "time_s" or signal.startswith("temp_") for signal in signals)
 
 
 @frozen(slots=False)
 class MeasuredRange:
-    """What was measured: where the axes were, and which state columns there are.
+    """The measured ranges of axes, inputs and time.
 
-    spans    axis -> (low, high), mm or degree, of what was measured
+    spans    axis -> (low, high) position, mm or degree
     columns  state columns that every file has and that vary
     clock    (first, last) time, s
-    warmth   temperature column -> (mean, standard deviation), K; what a thermal effect is at the mean is a constant
+    warmth   temperature column -> (mean, standard deviation), K; thermal effects are zero at the mean
     """
 
     machine: Machine
@@ -100,12 +99,12 @@ class MeasuredRange:
         return high - low > (UNTOUCHED_DEG if axis.rotary else UNTOUCHED_MM)
 
     def scaled(self, axis: Axis) -> dict[str, Any]:
-        """`center` and `scale` of an effect, so that u is -1 ... 1 over what was measured."""
+        """`center` and `scale` of an effect, so that u is -1 ... 1 over the measured range of an axis."""
         low, high = self.spans[axis.name]
         return {"center": (low + high) / 2, "scale": max((high - low) / 2, 1e-6)}
 
     def factor(self, axis: Axis) -> dict[str, Any]:
-        """`center` and `scale` of an axis that multiplies an effect."""
+        """`times`, `times_center` and `times_scale` of an effect that is multiplied by the position of an axis."""
         found = self.scaled(axis)
         return {"times": axis.name, "times_center": found["center"], "times_scale": found["scale"]}
 
@@ -126,32 +125,32 @@ class MeasuredRange:
 
 
 def along(axis: Axis) -> int | None:
-    """Which of its error axes lies along the axis itself (0, 1, 2); None if none does."""
+    """Index (0, 1, 2) of the error axis along the direction of the axis itself; None if none is."""
     shares = np.abs(np.asarray(axis.error_axes) @ np.asarray(axis.direction))
     index = int(shares.argmax())
     return index if shares[index] > 1 - 1e-9 else None
 
 
 def across(axis: Axis) -> tuple[int, ...]:
-    """The other two; all three where none lies along."""
+    """Indices of the error axes across the axis; all three if none is along it."""
     own = along(axis)
     return tuple(k for k in range(3) if k != own)
 
 
 def zero(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """The effects with as many zeros as their bases ask for."""
+    """The effects with zero coefficients."""
     from dataclasses import replace
 
     return tuple(replace(effect, coefficients=(0.0,) * effect.basis.size) for effect in effects)
 
 
 def weighed(variances: Sequence[float] | Array) -> Array:
-    """A loading of independent coefficients with these variances."""
+    """The loading of independent coefficients with these variances."""
     return np.diag(np.sqrt(np.asarray(variances, dtype=np.float64)))
 
 
 def stacked(*parts: Array) -> Array:
-    """Loadings of several effects that are independent of one another, one below the other."""
+    """The loading of several independent effects: their loadings as a block diagonal."""
     from scipy.linalg import block_diag
 
     whole: Array = block_diag(*parts)
@@ -160,7 +159,7 @@ def stacked(*parts: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def spline(low: float = -1.0, high: float = 1.0, pieces: int = PIECES) -> Spline:
-    """Cubic pieces over low ... high of u."""
+    """A cubic spline of equal pieces over low ... high of u."""
     inner = np.linspace(low, high, pieces + 1)
     knots = (low,) * 3 + tuple(float(x) for x in inner) + (high,) * 3
     return Spline(knots=knots)
@@ -168,19 +167,19 @@ def spline(low: float = -1.0, high: float = 1.0, pieces: int = PIECES) -> Spline
 
 @lru_cache(maxsize=64)
 def smooth_loading(length: float, low: float = -1.0, high: float = 1.0, pieces: int = PIECES) -> Array:
-    """The loading of a spline that is a Gaussian process of this length, (k, k)."""
+    """The loading (k, p) of a spline as a Gaussian process with this correlation length (squared exponential)."""
     places = _spline_places(low, high, pieces)
     return _root(np.exp(-0.5 * ((places[:, None] - places) / length) ** 2))
 
 
 def _spline_places(low: float, high: float, pieces: int) -> Array:
-    """Where the pieces have their middles."""
+    """Position of each coefficient of a spline: the mean of its inner knots (Greville abscissa), (pieces + 3,)."""
     knots = np.asarray(spline(low, high, pieces).knots)
     return np.array([knots[i + 1 : i + 4].mean() for i in range(pieces + 3)])
 
 
 def _root(covariance: Array) -> Array:
-    """Columns whose inner products are nearly this covariance."""
+    """A loading L (k, p) with L L' nearly equal to the covariance (k, k)."""
     values, vectors = np.linalg.eigh(covariance)
     kept = values > 1e-5 * values[-1]
     loading: Array = vectors[:, kept] * np.sqrt(values[kept])
@@ -189,7 +188,7 @@ def _root(covariance: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def time_course(length: float, pieces: int) -> Array:
-    """The loading of a spline that bends over this length, with kinks where a cause sets in (Matern 3/2), (k, p)."""
+    """The loading (k, p) of a spline as a Gaussian process with kinks (Matern 3/2), of this correlation length."""
     places = _spline_places(-1.0, 1.0, pieces)
     apart = np.sqrt(3) * np.abs(places[:, None] - places) / length
     return _root((1 + apart) * np.exp(-apart))
@@ -197,29 +196,29 @@ def time_course(length: float, pieces: int) -> Array:
 
 @lru_cache(maxsize=64)
 def bent_loading(length: float) -> Array:
-    """A spline loading without its mean and slope: those are constants of the machine."""
+    """The loading of a smooth spline without mean and slope, which are constants of the machine."""
     return smooth_loading(length) - _straight(length, 2)
 
 
 @lru_cache(maxsize=64)
 def leaning_loading(length: float) -> Array:
-    """A spline loading without its mean, and with half of its slope: other constants stand for that in part."""
+    """The loading of a smooth spline without mean and with half the slope, which other constants imitate in part."""
     return smooth_loading(length) - 0.5 * (_straight(length, 1) + _straight(length, 2))
 
 
 @lru_cache(maxsize=64)
 def turned_loading(length: float) -> Array:
-    """A spline loading with half of its mean: where a tilt is zero nobody knows; in part that is a constant."""
+    """The loading of a smooth spline with half the mean: the zero of a tilt is arbitrary, in part a constant."""
     return smooth_loading(length) - 0.5 * _straight(length, 1)
 
 
 def _straight(length: float, powers: int) -> Array:
-    """Mean, and slope if `powers` is 2, of what `smooth` loads."""
+    """The mean, and with `powers` 2 the slope as well, of `smooth_loading`."""
     places = _spline_places(-1.0, 1.0, PIECES)
     straight = np.linalg.qr(places[:, None] ** np.arange(powers))[0]
     return straight @ (straight.T @ smooth_loading(length))
 
 
 def harmonic_variances(count: int) -> tuple[float, ...]:
-    """Variances of cos and sin of the first orders."""
+    """Variances of cosine and sine of the first `count` orders."""
     return tuple(v for v in HARMONICS[:count] for _ in range(2))

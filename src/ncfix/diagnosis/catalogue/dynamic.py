@@ -1,9 +1,9 @@
-"""What drives do while axes move, on circles run at a feed: servo mismatch, lag, reversal spikes, changeover.
+"""Candidates of the drives while axes move, on circles at a feed: servo mismatch, lag, reversal spikes, changeover.
 
 A ball-bar records a circle while the machine runs it. Rows of kind `length` about a centre with `feed_mm_min`, in the
-order in which they were passed, say all that is asked: speed and acceleration of each linear axis, and how long ago it
-turned round. What follows the speed is the drives' (lag, servo mismatch), and what fades after a reversal is friction.
-They are settings of drives, or friction: a machine file says where axes stand, so nothing is added to it.
+order of the path, give speed and acceleration of each linear axis, and the time since its reversal. Errors that follow
+the speed are those of the drives (lag, servo mismatch); errors that fade after a reversal are friction. A machine file
+describes positions at rest, so none of these is added to it.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from ncfix.measure.measurement import CENTRE, Measurement
 # -- columns of how the axes moved -----------------------------------------------------------------------------------
 
 FEWEST = 12
-"""Rows of a circle."""
+"""Smallest number of rows of a circle."""
 APART = 0.5
-"""Of the radius: rows that are farther from the next ones are poses, no path."""
+"""Largest median distance of consecutive rows of a path, as a share of the radius; others are single poses."""
 FLAT = 1e-3
-"""An axis that moves less than this share of the others stands still."""
+"""An axis that moves by less than this share of the others stands still."""
 FADING_S = {"spike": 0.1, "settling": 0.4}
-"""Seconds in which what friction does after a reversal fades, by the first word of the column."""
+"""Prefix of a column -> time constant, s, of the decay of friction errors after a reversal."""
 
 
 def with_motion(measurement: Measurement, machine: Machine) -> Measurement:
-    """The measurement with columns of how the linear axes X Y Z moved, if its rows are circles run at a feed.
+    """The measurement with columns for the motion of X Y Z, if its rows are circles run at a feed.
 
-    - speed_x_y: mm/s of X, the way its number grows, on circles in XY; zero on others;
-    - accel_x_y: mm/s^2;
+    - speed_x_y: velocity of X, mm/s, on circles in XY; zero on others;
+    - accel_x_y: acceleration of X, mm/s^2;
     - slave_x_y: speed_x_y where Y is faster, else zero;
-    - spike_x, settling_x: the direction in which it moves, faded since it turned round;
-    - dir_X: that direction, where the file does not say it.
+    - spike_x, settling_x: direction of motion of X, decaying with the time since its reversal;
+    - dir_X: direction of motion of X, unless the file states it.
     """
     if measurement.kind != "length" or not {*CENTRE, "feed_mm_min"} <= set(measurement.columns):
         return measurement
@@ -69,7 +69,10 @@ def _columns(name: str, names: Sequence[str]) -> Iterator[str]:
 
 
 def _of_path(found: dict[str, Array], names: list[str], places: Array, feed: Array, rows: Ints) -> None:
-    """Fill in the columns of one set."""
+    """Fill in the columns `found` for the rows of one set.
+
+    places  (n, axes) positions of the axes `names`, mm; feed (n,) mm/s; rows: indices of these rows
+    """
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     way = np.concatenate([[0.0], np.cumsum(steps)])
     time = np.concatenate([[0.0], np.cumsum(steps / (0.5 * (feed[1:] + feed[:-1])))])
@@ -99,13 +102,13 @@ def _of_path(found: dict[str, Array], names: list[str], places: Array, feed: Arr
 # -- what they tell ----------------------------------------------------------------------------------------------------
 
 SPEED, ACCELERATION = 50.0, 50.0
-"""mm/s and mm/s^2: the scales of these; of no consequence."""
+"""Scales of speed, mm/s, and acceleration, mm/s^2, in effects; the results do not depend on them."""
 GROWING = 0.3
-"""How much more or less a spike may be at the end of the travel than in its middle, as a share."""
+"""Standard deviation of the relative change of a spike from the middle to the end of the travel."""
 
 
 def dynamic_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
-    """All of them."""
+    """Candidates of the drives, if circles were run at a feed."""
     for axis in measured.linear:
         if f"spike_{axis.name.lower()}" in measured.columns:
             yield from _spikes(measured, axis)
@@ -134,15 +137,14 @@ def _spikes(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
 
 
 def _pair(first: Axis, second: Axis) -> Iterator[Candidate]:
-    """Both lag alike: circles are smaller the faster they are run. One lags more: they are oval at 45 degrees.
-
-    The slower one lags more: they have steps there.
+    """Candidates of a pair of axes: equal lag shrinks circles with the feed; unequal lag makes them oval at 45 degrees;
+    a larger lag of the slower axis makes steps at 45 degrees.
     """
     names = [f"E{LETTERS[own]}{axis.name}" for axis in (first, second) if (own := along(axis)) is not None]
     if len(names) < 2:
         return
     pair, family = f"{first.name}{second.name}", f"{first.name}{second.name} drives"
-    # a body of the workpiece side goes against the way in which its number grows
+    # the body of a workpiece-side axis moves against its positive direction
     sense = [float(np.asarray(a.error_axes[along(a) or 0]) @ np.asarray(a.direction)) for a in (first, second)]
     for kind, word, size, signs, title, remedy in (
         ("servo mismatch", "speed", SPEED, (1.0, -1.0), "one lags more than the other: circles are oval at 45 degrees, "

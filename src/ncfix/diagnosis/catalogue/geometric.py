@@ -1,8 +1,7 @@
-"""Effects of linear axes by position and direction: curves, screws, lost motion. Rows 2 to 12 of the catalogue.
+"""Geometric candidates: error motions and lost motion of linear and rotary axes, location errors and gains.
 
-Effects of rotary axes by angle and direction. Rows 21 to 27 and 37 of the catalogue.
-
-Where axes lie, and gains: constants that the machine file does not have. Rows 1, 7 and 20 of the catalogue.
+Rows of the catalogue: 2 to 12 linear axes (curves, screws, lost motion); 21 to 27 and 37 rotary axes; 1, 7 and 20
+location errors and gains that the machine file lacks.
 """
 
 from __future__ import annotations
@@ -36,24 +35,24 @@ from ncfix.machine.axes import Axis, component_title, is_arm
 from ncfix.machine.basis import Backlash, Fourier, Periodic, Polynomial
 
 PIVOT = 10.0
-"""mm: how far the point about which a slide tilts lies from the reference point stated, in each direction."""
+"""Standard deviation of a slide's tilting point from the reference point, mm per direction."""
 HALF = 0.5
-"""Of a play: how far its middle may lie from the zero of the axis."""
+"""Standard deviation of the middle of a play from the axis zero, as a share of the play."""
 PITCHES = (4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 25.0, 30.0, 32.0, 40.0)
-"""mm: usual screws, where the machine file does not say."""
+"""Pitches of usual screws, mm, if the machine file states none."""
 WORN = "re-measure the axis directly; a scale or guide that changes locally is worn"
 SLACK = "check nut preload, thrust bearings and coupling"
 GUIDE = "check the preload of the guide"
 ORDERS = (1, 2, 3, 4, 5, 6, 7, 8)
 SCALE_ORDERS = ORDERS[:4]
-"""Those of an encoder: more waves a turn are a worm's, which swells along the turn, too."""
+"""Orders of an encoder error; higher orders are those of a worm."""
 TEETH = tuple(range(5, 181))
-"""Errors per turn that a worm, gear or encoder may have."""
+"""Orders, cycles per turn, of the error of a worm, gear or encoder."""
 ONE = (np.eye(1),)
 
 
 def linear_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
-    """All of them."""
+    """Candidates of linear axes: error motions, periodic errors of the screw, lost motion."""
     for axis in measured.linear:
         yield from _curves(measured, axis)
         yield from _screw(measured, axis)
@@ -77,7 +76,7 @@ def _curves(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
 
 
 def swept(component: str, axis: Axis) -> tuple[str, ...]:
-    """The shifts that come with a tilt if its pivot is not at the reference point; none for a shift."""
+    """Names of the shifts that accompany a tilt about a pivot away from the reference point; none for a shift."""
     if component in LETTERS:
         return ()
     return tuple(f"E{letter}{axis.name}" for letter in LETTERS if letter != LETTERS[TURNS.index(component)])
@@ -101,7 +100,7 @@ def _screw(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
 
 
 def _of_pitch(index: int, count: int) -> Array:
-    """The columns of one pitch: its harmonics, and the same growing along the screw."""
+    """The loading for pitch number `index` of `count`: its harmonics, constant and growing along the screw."""
     variances = np.zeros((2, count, 6))
     variances[0, index] = harmonic_variances(3)
     variances[1, index] = 0.3 * np.asarray(harmonic_variances(3))
@@ -125,13 +124,13 @@ def _lost(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
             title = f"{sort} play of {axis.name} {way} at reversal"
         parts = [Effect(each, (), play, **span) for each in (symbol, *swept(component, axis))]
         loading = stacked(weighed(LOST), *[PIVOT * weighed(LOST)] * (len(parts) - 1))
-        if tilt:  # half of the play either way, or all of it one way: the zero may have been set on either side
+        if tilt:  # the zero may have been set on either side of the play, so a constant comes with it
             parts, loading = [*parts, Effect(symbol, ())], stacked(loading, np.array([[HALF]]))
         yield Candidate(name, title, axis.name, family, zero(parts), (loading,), needs, remedy, lead=1)
 
 
 def rotary_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
-    """All of them."""
+    """Candidates of rotary axes: error motions, worm, backlash, seat."""
     for axis in measured.rotary:
         own = along(axis)
         if own is None:
@@ -144,7 +143,7 @@ def rotary_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
 
 
 def _motions(axis: Axis, own: int) -> Iterator[Candidate]:
-    """Radial, axial, wobble, encoder: one name each, whatever the order."""
+    """Radial, axial, wobble and encoder errors of a rotary axis, each of all orders."""
     q, first, second = axis.name, *across(axis)
     bearing = "check the bearing and how its rings are seated"
     sorts = (
@@ -166,7 +165,7 @@ def _motions(axis: Axis, own: int) -> Iterator[Candidate]:
 
 
 def _worm(axis: Axis, own: int) -> Candidate:
-    """Many waves a turn: how many is found out."""
+    """The error of a worm or gear, one form for each number of cycles per turn."""
     effect = zero([Effect(f"E{TURNS[own]}{axis.name}", (), Fourier(order=TEETH))])
     columns = np.eye(2 * len(TEETH))
     loadings: tuple[Array, ...] = tuple(columns[:, 2 * k : 2 * k + 2] for k in range(len(TEETH)))
@@ -186,7 +185,7 @@ def _backlash(measured: MeasuredRange, axis: Axis, own: int) -> Candidate:
 
 
 def _seat(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
-    """The seat of a rotary axis yields with the place of a linear axis: of which one, and which way, is found out."""
+    """A once-per-turn shift of a rotary axis proportional to a linear position; forms by linear axis and direction."""
     if not measured.linear:
         return
     wave = Fourier(order=(1,))
@@ -203,10 +202,10 @@ def _seat(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
 
 
 def location_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
-    """The location errors that the file lacks.
+    """Location errors and gains that the machine file lacks.
 
-    Gains, and lines of which the file says nothing, go before all other effects. Where it has some of the lines, what
-    it lacks says the same again for the most part: those are names like others.
+    Gains, and location errors of axes for which the file has none, are constants, selected before other effects. If the
+    file has some of them, the lacking ones are mostly redundant, and are candidates like others.
     """
     known = {effect.name for effect in measured.machine.effects}
     for axis in (*measured.linear, *measured.rotary):
@@ -228,9 +227,9 @@ def location_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
 
 
 def _slope_lacks(measured: MeasuredRange, axis: Axis, component: str) -> bool:
-    """Whether no constant is the slope of this shift of a linear axis, though the file says how others lie.
+    """Whether the file lacks the squareness that is the slope of this straightness, though it has other ones.
 
-    Then other constants stand for it as long as only one tool is used, and no longer.
+    Other constants then imitate the slope, but only for a single tool length.
     """
     own = along(axis)
     if component not in LETTERS or own is None or LETTERS.index(component) == own or not _located(measured, axis):
@@ -244,7 +243,7 @@ def _gain(axis: Axis) -> str:
 
 
 def _located(measured: MeasuredRange, axis: Axis) -> bool:
-    """Whether the file says where this axis lies; of linear axes, where any of them does."""
+    """Whether the file has location errors of this axis; for a linear axis, of any linear axis."""
     names = {axis.name} if axis.rotary else {each.name for each in measured.linear}
     return any(effect.location and effect.joint in names for effect in measured.machine.effects)
 
@@ -254,7 +253,7 @@ def _is_gain(effect: Effect, name: str) -> bool:
 
 
 def _lines(measured: MeasuredRange, axis: Axis) -> tuple[str, ...]:
-    """The location errors that an axis line can have; of a joint of an arm its zero, too."""
+    """Names of the location errors of an axis; for a joint of an arm with its zero offset."""
     tilts = tuple(f"E{TURNS[k]}0{axis.name}" for k in across(axis))
     own = along(axis)
     if axis.rotary and own is not None and is_arm(measured.machine.axes):

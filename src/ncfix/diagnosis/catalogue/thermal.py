@@ -1,10 +1,9 @@
-"""What warms, and what happens in the course of time. Rows 39 to 44, 47 and 49 of the catalogue.
+"""Thermal candidates, and those that depend on time. Rows 39 to 44, 47 and 49 of the catalogue.
 
-A name says where an effect acts: along the tool, on an axis line, in proportion to a position. Its course in time is no
-part of the name: what drives it is rarely what is measured, for a sensor may be late or sit on another body. So each
-effect may follow any logged temperature, at once or with a lag, and has a course of its own besides, or nothing but
-that, or it closely follows the sensors that are called like its body; the bodies differ only in which sensors are
-likely theirs, and in how slow they are.
+A name says where an effect acts: along the tool, on an axis line, in proportion to a position. It does not say how the
+effect goes in time, since a sensor may be late or sit on another body. So each effect has several forms: it follows any
+logged temperatures, at once or with a lag, plus a course of time of its own; or mainly that course; or closely the
+sensors named like its body. Bodies differ in which sensors are likely theirs, and in how slow they are.
 """
 
 from __future__ import annotations
@@ -36,40 +35,41 @@ from ncfix.machine.piecewise import PiecewiseConstant
 from ncfix.values import frozen
 
 LAGS = (None, 600.0, 1800.0, 5400.0)
-"""s: at once, a spindle, a slide, a frame; what lies between is a mixture."""
+"""Time constants, s: none, of a spindle, a slide, a frame; others are represented by a mixture."""
 PIECES = 24
-"""Pieces of a course of time."""
+"""Pieces of the spline of a course of time."""
 FREE = 0.4
-"""Variance of the course of time beside that of the temperatures."""
+"""Variance of the course of time relative to that of the temperatures."""
 BADLY = 0.25
-"""Variance of the temperatures beside that of the course of time, where they say little."""
+"""Variance of the temperatures relative to that of the course of time, if they say little."""
 FOREIGN = 0.3
-"""Variance of a sensor that is likely of another body, or of the air about it."""
+"""Relative variance of a sensor that is probably on another body, or in the air."""
 CLOSELY = 0.05
-"""Variance of the course of time beside that of a body's own sensors."""
+"""Variance of the course of time relative to that of a body's own sensors."""
 AIR = ("ambient", "air", "hall", "room")
 HOT = ("spindle", "head", "motor", "bearing")
 STAND = ("column", "bed", "frame", "base", "stand")
 HOLDS = 4
-"""Places along its travel at which a scale may be held."""
+"""Number of assumed fixed points of a scale along its travel."""
 BETWEEN = 1 / (HOLDS - 1) / np.sqrt(3)
-"""The true one is between two of them: how far from the nearer one, of half the travel, rms."""
+"""Standard deviation of the true fixed point from the nearest assumed one, in units of half the travel."""
 SLIPS = 40
+"""Number of moments at which a slip is sought."""
 DEGREE = Polynomial(degree=(1,))
 WARMER = 5.0
-"""K: unit of temperature."""
+"""Unit of temperature in effects, K."""
 BESIDE = 0.3
-"""Size of what goes another way with a course of its own, against what leads."""
+"""Size of the components that accompany the leading one, relative to it."""
 WARM_UP = "warm up before measuring and cutting"
 Parts = Sequence[tuple[str, Mapping[str, Any]]]
 
 
 @frozen(slots=False)
 class Body:
-    """What becomes warm.
+    """A body of the machine that becomes warm.
 
-    slow, quick  s: over which times its course bends where it follows its sensors, and where it does not
-    words        what its own sensors are called
+    slow, quick  correlation times, s, of its course of time beside its temperatures, and without them
+    words        words in the names of its own sensors
     """
 
     slow: float
@@ -80,19 +80,19 @@ class Body:
 SPINDLES, FRAMES = Body(3600.0, 1200.0, HOT), Body(7200.0, 2400.0, STAND)
 OUTSIDE = Body(14400.0, 7200.0, AIR)
 PLATE = Body(28800.0, 28800.0)
-"""One that is held at a point nobody knows: all ways at once with courses of their own would be anything."""
+"""An artefact on the table, whose fixed point is unknown; slow, since faster courses in all directions fit anything."""
 
 
 @frozen(repr=False, slots=False)
 class Drive:
-    """What drives a thermal effect: options of effects, and the loadings of their coefficients, one for each form."""
+    """The inputs of a thermal effect: options of effects, and loadings of their coefficients, one for each form."""
 
     options: tuple[dict[str, Any], ...]
     forms: tuple[Array, ...]
 
 
 def thermal_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
-    """All of them, if time or a temperature was logged."""
+    """Thermal candidates and slip; none unless time or a temperature was logged."""
     clocked = "time_s" in measured.columns and measured.clock[1] > measured.clock[0]
     if not clocked and not measured.sensors:
         return
@@ -112,7 +112,7 @@ def thermal_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
 
 
 def _of(sensor: str, words: Sequence[str]) -> bool:
-    """Whether a sensor's name says that it is one of these."""
+    """Whether the name of a sensor contains one of these words."""
     return any(word in sensor.removeprefix("temp_").split("_") for word in words)
 
 
@@ -126,7 +126,7 @@ def _growth(measured: MeasuredRange, inside: Mapping[str, float], clocked: bool)
 
 
 def _drifts(measured: MeasuredRange, driven: Drive, clocked: bool) -> Iterator[Candidate]:
-    """The frame moves along a base axis: with the machine's own heat, or with the hall's day."""
+    """Shifts of the frame along each base axis, driven by the machine's heat or by the temperature of the air."""
     held = by_foundation(measured)
     air = [name for name in measured.sensors if _of(name, AIR)]
     outside = _drive(measured, dict.fromkeys(air, 1.0), OUTSIDE, clocked, _swing(measured, air))
@@ -140,7 +140,7 @@ def _drifts(measured: MeasuredRange, driven: Drive, clocked: bool) -> Iterator[C
 
 
 def _scales(measured: MeasuredRange, axis: Axis, driven: Drive) -> Iterator[Candidate]:
-    """Positions of a linear axis stretch, from a place along its travel that nobody knows; none of a skewed axis."""
+    """Thermal expansion of the scale of a linear axis about an unknown fixed point; none for a skewed axis."""
     own = along(axis)
     if own is None:
         return
@@ -151,14 +151,14 @@ def _scales(measured: MeasuredRange, axis: Axis, driven: Drive) -> Iterator[Cand
 
 
 def _bends(axis: Axis, driven: Drive) -> Iterator[Candidate]:
-    """A linear axis tilts about each direction."""
+    """Thermal tilts of a linear axis about each direction."""
     for turn, letter in zip(TURNS, LETTERS, strict=True):
         title, name = f"thermal bend: {axis.name} tilts about {letter} with temperature", f"E{turn}{axis.name}"
         yield _driven(f"thermal bend {name}", title, axis.name, [[(name, {})]], driven)
 
 
 def _centre(axis: Axis, driven: Drive) -> Candidate:
-    """The line of a rotary axis moves across itself, with what carries the axis or against it."""
+    """Thermal shift of the line of a rotary axis, with what it carries or of the line alone."""
     lines = [f"E{LETTERS[k]}0{axis.name}" for k in across(axis)]
     ways: list[Parts] = [[(line, how) for line in lines] for how in ({"carried": True}, {})]
     title = f"rotary centre drift of {axis.name}: its axis line moves with temperature"
@@ -174,10 +174,10 @@ def _driven(
     family: str = "heat",
     among: Sequence[Sequence[float]] = (),
 ) -> Candidate:
-    """Components that follow temperatures, lagged and not, and a course of time; at one of several places.
+    """A candidate whose components follow the inputs of `drive`; one form for each place and leading component.
 
-    Of several components at a place one leads, whichever: one heat moves a body one way, and hardly any other way with
-    a course of its own. What walks all ways at once is no body that warms. `among` has other sizes.
+    At each place one component leads and the others are smaller (`BESIDE`), since heat moves a body mainly one way.
+    among  relative sizes of the components, instead
     """
     effects = zero(
         [Effect(part, (), **each, **options) for place in places for part, options in place for each in drive.options]
@@ -197,19 +197,22 @@ def _driven(
 
 
 def _leading(count: int) -> list[list[float]]:
-    """The sizes of so many components of which one leads, for each of them."""
+    """Relative sizes of `count` components, one list for each leading component."""
     return [[1.0 if part == leads else BESIDE for part in range(count)] for leads in range(count)]
 
 
 def _swing(measured: MeasuredRange, air: Sequence[str]) -> float:
-    """How much the air swings, against what warms a machine."""
+    """Standard deviation of the air temperature, in units of `WARMER`."""
     return max((measured.warmth[sensor][1] for sensor in air), default=0.0) / WARMER
 
 
 def _drive(
     measured: MeasuredRange, sensors: Mapping[str, float], body: Body, clocked: bool, course: float = 1.0
 ) -> Drive:
-    """Sensors with these variances, and courses of time of such a size besides: that of a body."""
+    """The inputs of a body's effects: sensors with these variances, and a course of time.
+
+    clocked  time was logged; course: relative size of the course of time
+    """
     options: list[dict[str, Any]] = []
     lags = LAGS if "time_s" in measured.columns else LAGS[:1]
     for sensor in sensors:
@@ -230,7 +233,7 @@ def _drive(
 
 
 def _slip(measured: MeasuredRange) -> Iterator[Candidate]:
-    """Before and after a moment differ by a vector; the moment is found out."""
+    """A sudden shift of the frame; one form for each moment."""
     first, last = measured.clock
     held = by_foundation(measured)
     moments = first + (last - first) * (np.arange(SLIPS) + 1) / (SLIPS + 1)
@@ -252,7 +255,7 @@ def _slip(measured: MeasuredRange) -> Iterator[Candidate]:
 
 
 def _artefact(measured: MeasuredRange, clocked: bool) -> Candidate:
-    """The balls on the table move apart as their plate warms: no error of the machine, and none in its file."""
+    """Thermal expansion of the artefact on the table: no error of the machine, never added to its file."""
     drive = _drive(measured, dict.fromkeys(measured.sensors, 1.0), PLATE, clocked)
     effects = zero([Effect(f"EX{SPINDLE}", (), **each) for each in drive.options])
     title = "artefact growth: the artefact or workpiece expands with temperature"

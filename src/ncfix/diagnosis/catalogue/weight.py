@@ -1,7 +1,7 @@
-"""What weight and load do: sag, droop, nod, tilt. Rows 28 to 36 of the catalogue.
+"""Candidates caused by weight and load: sag, droop, nod, tilt. Rows 28 to 36 of the catalogue.
 
-A beam that sags turns what rides on it: the deflection f and its slope f' are one effect with one size. Which way is
-down is not in a machine file, so every way across an axis is a form of the effect.
+A beam that sags tilts what rides on it: the deflection f and its slope f' are one effect with one size. A machine file
+does not say which way is down, so every direction across an axis is a form of the effect.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ from ncfix.machine.effects import leaning, yielding
 
 POWERS = (0, 1, 2, 3, 4)
 FOOT = 30.0
-"""mm: how far the point about which a nodding slide turns lies from the reference point stated."""
+"""Standard deviation of a nodding slide's pivot from the reference point, mm."""
 TILTED = 0.2
-"""How much more or less than the slope a slide tilts, as a share: it is as long as its carriages are apart."""
+"""Standard deviation of a slide's tilt from the slope of its beam, as a share: its carriages are some way apart."""
 LOAD: dict[str, Any] = {"times": "load_kg", "times_center": 0.0, "times_scale": 100.0}
 BOW = np.array([[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0.5, 0], [0, 0, 0.3]])
 """Columns: u^2, u^3, u^4 with their sizes: a bed between its supports."""
 FREE_END = np.array([[1, 0.3], [2, 0.9], [1, 0.9], [0, 0.3], [0, 0]])
-"""Columns: (1 + u)^2 and (1 + u)^3, a beam that is longer the further it is out."""
+"""Columns: (1 + u)^2 and (1 + u)^3 with their sizes: a cantilever that becomes longer towards u = 1."""
 MIRROR = np.diag([1.0, -1.0, 1.0, -1.0, 1.0])
 
 
 def weight_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
-    """All of them."""
+    """Candidates caused by weight and load."""
     for axis in measured.linear:
         yield from _beam(measured, axis)
         yield from _nod(measured, axis)
@@ -79,8 +79,10 @@ def _beam(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
 def _deflected(
     measured: MeasuredRange, axis: Axis, own: int, forms: tuple[Array, ...]
 ) -> tuple[tuple[Effect, ...], tuple[Array, ...]]:
-    """Shift across and its slope as a tilt, either way. That the slide turns about a foot elsewhere shifts it by much
-    less: with shifts of their own, two curves that have nothing to do with a sag would be taken for one.
+    """Effects and loadings of a deflection and its slope, for both directions across the axis.
+
+    There are no free shifts by an unknown pivot of the tilt. They would be small, and with them two unrelated curves
+    would be taken for a sag.
     """
     span = measured.scaled(axis)
     basis, none = Polynomial(degree=POWERS), np.zeros((2 * len(POWERS), 0))
@@ -98,9 +100,9 @@ def _deflected(
 
 
 def _sloped(form: Array, factor: float) -> Array:
-    """The loading of [f, f' or nearly] for f with these columns of powers.
+    """The loading of deflection and tilt, for columns `form` of powers of u; `factor` converts df/du to a tilt.
 
-    The shift is without mean and slope, which are constants of the machine: where an axis lies, and its gain.
+    The tilt may differ from the slope by the share `TILTED`. The shift has no mean and slope, which are constants.
     """
     slope = np.zeros_like(form)
     slope[:-1] = factor * form[1:] * np.arange(1, len(form))[:, None]
@@ -109,7 +111,7 @@ def _sloped(form: Array, factor: float) -> Array:
 
 
 def _bent(form: Array) -> Array:
-    """Columns of powers without what is constant and straight over -1 ... 1."""
+    """Columns of powers without their mean and slope over -1 ... 1."""
     powers = np.arange(len(form))[:, None]
     rest: Array = form.astype(np.float64)
     rest[0] -= (form / (powers + 1))[0::2].sum(axis=0)
@@ -118,7 +120,7 @@ def _bent(form: Array) -> Array:
 
 
 def _nod(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
-    """A slide tilts by where another one is, the more the further out it is itself."""
+    """Tilt of a slide by the product of its own position and that of another slide."""
     others = [each for each in measured.linear if each is not axis and each.workpiece_side == axis.workpiece_side]
     others = others or [each for each in measured.linear if each is not axis]
     effects, count = [], 0
@@ -143,14 +145,14 @@ def _nod(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
 
 
 def _placed(block: Array, index: int, count: int) -> Array:
-    """One block of several, the others zero."""
+    """A loading that is `block` at place `index` of `count`, and zero elsewhere."""
     whole = np.zeros((count * block.shape[0], block.shape[1]))
     whole[index * block.shape[0] : (index + 1) * block.shape[0]] = block
     return whole
 
 
 def _foundation(measured: MeasuredRange, axis: Axis) -> Candidate:
-    """The whole of one branch tilts against the other as the slide's mass moves; the pivot stays where it is."""
+    """Tilt of one branch against the other as the mass of a slide moves, about a fixed pivot."""
     basis = Polynomial(degree=(1, 2))
     held = by_foundation(measured)
     span = measured.scaled(axis)
@@ -164,14 +166,14 @@ def _foundation(measured: MeasuredRange, axis: Axis) -> Candidate:
 
 
 def by_foundation(measured: MeasuredRange) -> Axis:
-    """An axis next to the foundation, on the tool's side if there is one."""
+    """The axis next to the foundation, on the tool side if there is one."""
     axes = measured.machine.axes
     tool = [axis for axis in axes if not axis.workpiece_side]
     return tool[0] if tool else axes[-1]
 
 
 def _table(axis: Axis) -> Candidate:
-    """A table that is softer one way than the other: a tilt twice a turn whose direction turns along."""
+    """A table of anisotropic stiffness: a tilt twice per turn, its direction rotating forward or backward."""
     first, second = across(axis)
     effects = zero([Effect(f"E{TURNS[k]}{axis.name}", (), Fourier(order=(2,))) for k in (first, second)])
     turning = np.array([[1, 0], [0, 1], [0, -1], [1, 0]], dtype=np.float64)
@@ -184,7 +186,7 @@ def _table(axis: Axis) -> Candidate:
 
 
 def _unbalanced(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
-    """The load's weight turns the axis, once a turn, in proportion to the mass; not where it stands upright."""
+    """A once-per-turn angle error of a rotary axis in proportion to the load; none if the load was not logged."""
     own = along(axis)
     if own is None or "load_kg" not in measured.columns:
         return
@@ -208,7 +210,7 @@ def _unbalanced(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
 
 
 def _sag(measured: MeasuredRange, axis: Axis) -> Candidate:
-    """A swivelling body sags by its own weight and its load, as the sine and cosine of the angle."""
+    """Sag of a swivelling body by its own weight and its load, as sine and cosine of the angle."""
     first, second = across(axis)
     own = along(axis) or 0
     wave = Fourier(order=(1,))
@@ -233,7 +235,7 @@ def _sag(measured: MeasuredRange, axis: Axis) -> Candidate:
 
 
 def _yielding(measured: MeasuredRange, axis: Axis) -> Candidate:
-    """The gear of an arm's joint yields under the weight of links and load: as sine and cosine of how they lean."""
+    """Compliance of the gear of an arm's joint under links and load, as sine and cosine of their inclination."""
     own = along(axis) or 0
     plain = [yielding(f"E{TURNS[own]}{axis.name}", axis, lean) for lean in leaning(measured.machine.axes, axis)]
     loaded = "load_kg" in measured.columns
@@ -247,7 +249,7 @@ def _yielding(measured: MeasuredRange, axis: Axis) -> Candidate:
 
 
 def _twist(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
-    """Driven from one side, a trunnion twists: its angle lags the more the further along it one looks."""
+    """Twist of a trunnion that is driven from one side: its angle lags in proportion to the position along it."""
     own = along(axis)
     line = np.abs(np.asarray(axis.direction))
     others = [each for each in measured.linear if line @ np.abs(np.asarray(each.direction)) > 0.3]
@@ -264,7 +266,7 @@ def _twist(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
 
 
 def _droop(measured: MeasuredRange) -> Iterator[Candidate]:
-    """Tool and holder hang by their weight; seen where the tool's way to the weight changes."""
+    """Droop of tool and holder by their weight; visible only if rotary axes tilt the tool."""
     heads = [axis for axis in measured.rotary if not axis.workpiece_side]
     if "tool_length" not in measured.columns or not heads:
         return

@@ -1,10 +1,9 @@
-"""Whether the tables of a machine file are those of this machine at all.
+"""Test whether the error curves of a machine file belong to this machine at all.
 
-Each curve of the file is asked to be another one: a new draw, as large and as smooth as the file has it. That the whole
-file is another machine's leaves out what the file says of all curves, and draws all of them anew. The rival is that the
-file is right and some of its curves have changed: each of those is drawn beside what the file says, and pays as a
-further effect does. Where the file is right, to leave its curves out costs far more than to keep them; where nothing
-of it holds, keeping them costs the squares of two unrelated curves where one would do.
+Hypothesis "foreign": no curve of the file holds; each is replaced by an unknown curve of the same size and smoothness.
+Hypothesis "changed": the file is right, but some of its curves have changed; an unknown curve is added to each of
+these, at the price of a further effect. If the file is right, dropping its curves costs far more than keeping them. If
+it is foreign, keeping them costs the squares of two unrelated curves instead of one.
 """
 
 from __future__ import annotations
@@ -27,21 +26,19 @@ from ncfix.measure.selection import Selection
 from ncfix.values import frozen
 
 SMOOTH = 0.3
-"""How far the values of a table know of each other, of its length."""
+"""Correlation length of the values of a table, as a share of its length."""
 CHANGES = (0.3, 0.7, 1.4)
-"""Size of a change against that of the curve: two unrelated curves of one size differ by the last."""
+"""Assumed sizes of a change, relative to its curve; two unrelated curves of one size differ by the last."""
 CLEARLY = 25.0
-"""Log odds of another machine's file against one of whose curves some have changed, from which on it is sure."""
+"""Log odds of "foreign" against "changed" from which on the file is another machine's."""
 FREEDOM = 1.0
-"""Degrees of freedom of what is known of the noise."""
+"""Degrees of freedom of the prior noise."""
 
 
 def without_foreign_tables(
     measurements: Sequence[Measurement], machine: Machine, now: Misfit
 ) -> Iterator[tuple[Machine, int, float]]:
-    """The machine without the curves of its file, where none of them holds: its constants as the data have them, how
-    many these are, and the log odds that are gained. The curves of this machine are missing then.
-    """
+    """If no curve of the file holds: the machine with fitted constants only, their number, and the gain of log odds."""
     if machine.is_perfect or all(map(is_free, machine.effects)):
         return
     curves = CurvesOfFile.of(now)
@@ -56,11 +53,12 @@ def without_foreign_tables(
 
 @frozen(repr=False, slots=False)
 class CurvesOfFile:
-    """The curves of a machine file against the data, beside set-up and constants, in units of the noise.
+    """The curves of a machine file and the data, in units of the noise, orthogonal to set-up and constants.
 
-    y      (n,) values minus what the file says
-    shown  what each curve shows as the file has it, (n,); drawn (n, k) what it may show instead, one draw of its size
-    freedom  values less what is free
+    y        (n,) values minus the prediction of the file
+    shown    for each curve, its effect on the values, (n,)
+    drawn    for each curve, columns (n, k) of a random curve of its size and smoothness
+    freedom  number of values less that of free parameters
     """
 
     y: Array
@@ -70,7 +68,7 @@ class CurvesOfFile:
 
     @staticmethod
     def of(now: Misfit) -> CurvesOfFile:
-        """The curves of the file of a misfit."""
+        """The curves of the machine file of a misfit."""
         problem, scale = now.problem, now.problem.um / (now.noise * now.relative)
         free = np.concatenate([problem.nuisance(problem.start), problem.design], axis=1) * scale[:, None]
         basis = orthonormal(free)
@@ -85,17 +83,17 @@ class CurvesOfFile:
 
     @property
     def as_given(self) -> float:
-        """Log likelihood of the file as it is, constants free."""
+        """Log likelihood of the given file with free constants."""
         return self._likelihood(self.y, (), 0.0)
 
     @property
     def foreign(self) -> float:
-        """Log likelihood where no curve of the file holds, and each is another one of its size."""
+        """Log likelihood if each curve of the file is replaced by an unknown one of its size."""
         return self._likelihood(self.y + np.sum(self.shown, axis=0), range(len(self.drawn)), 1.0)
 
     @property
     def changed(self) -> float:
-        """Log likelihood where some of the curves have changed, less what these pay: the likeliest of them."""
+        """Log likelihood if the likeliest set of curves has changed, less their price."""
         price, best = FURTHER + float(np.log(len(self.drawn))), self.as_given
         chosen: tuple[int, ...] = ()
         while len(chosen) < len(self.drawn):
@@ -111,7 +109,7 @@ class CurvesOfFile:
         return float(logsumexp(weights) - np.log(len(CHANGES)))
 
     def _likelihood(self, y: Array, which: Sequence[int], size: float) -> float:
-        """With these curves drawn at this size."""
+        """Log likelihood of y with a random curve of relative `size` for each index in `which`."""
         columns = np.concatenate([np.zeros((len(y), 0)), *(size * self.drawn[k] for k in which)], axis=1)
         factor = cholesky(np.eye(columns.shape[1]) + columns.T @ columns, lower=True) if which else np.eye(0)
         gained = solve_triangular(factor, columns.T @ y, lower=True) if which else np.zeros(0)
@@ -120,7 +118,7 @@ class CurvesOfFile:
 
 
 def _draws(effect: Effect) -> Array:
-    """Coefficients of curves as large as this one, (p, k) from k independent numbers of variance one."""
+    """The loading (p, k) from k independent numbers of unit variance to the coefficients of a curve of this size."""
     size = float(np.sqrt(np.mean(np.square(effect.coefficients))))
     if not isinstance(effect.basis, PiecewiseLinear):
         return size * np.eye(effect.basis.size)

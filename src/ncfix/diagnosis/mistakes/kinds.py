@@ -1,7 +1,7 @@
-"""What people and software get wrong, each undone: machine file and measurements as they would be without the mistake.
+"""All mistakes that are considered, each with machine file and measurements corrected for it.
 
-Signs, units, columns, tables, tools and temperature change what the file says by known columns: what is left once they
-are undone is seen to first order. Of positions and axes it is not.
+Mistakes of signs, units, columns, tables, tools and temperature change the prediction by a known column, so their
+residual is known to first order without a new fit. Mistakes of positions and axes need a new fit.
 """
 
 from __future__ import annotations
@@ -34,25 +34,28 @@ from ncfix.measure.measurement import Measurement
 from ncfix.values import frozen
 
 DOUBTED, OFF = 0.3, 3.0
-"""Times what is much of a machine of its size and kind: an axis point that is further off may be wrong in the file
-only; from the second on it was measured wrongly, no axis moves so far."""
+"""Displacements of an axis point, in units of a large location error of this machine (`plausible.much`): beyond the
+first the point in the file may be wrong; beyond the second it must be, since no axis moves so far."""
 NOWHERE_MM = 0.1
-"""A first step that is smaller leads to none that is off: what it leaves is of second order."""
+"""Smallest first step, mm, towards a wrong axis point; a smaller one means that the point is right."""
 SIDE = 0.3
-"""Share of its way from which on a direction in which the point of an axis moved is named."""
+"""Share of the displacement of an axis point from which a component is listed as an alias."""
 PIVOT, PIVOT_STEPS = "pivot", 3
-"""The name of an axis point that is off; and steps in which it is moved to where the data have it."""
+"""Name of the mistake of a wrong axis point; number of Gauss-Newton steps to the right one."""
 TOOL_STEP_MM, TOOL_LEAST_MM, MOST_TOOLS, MOST_SETS, TOOL_NUMBERS = 50.0, 1.0, 4, 12, 4
-"""By how much a tool is longer to see what that shows; the least error; of how many tools, and sets of rows; what is
-unknown of a tool that nothing is stated of: its length, and where its tip is."""
+"""Step of the numerical derivative by tool length; smallest error of a length; largest numbers of tools and of sets
+that are tried one by one; unknowns of a tool without a stated length: the length, and three of its tip."""
 WARM_STEP_K, WARM_LEAST_K, STEEL = 20.0, 8.0, 11.5e-6
-"""The same for the temperature of a workpiece, and the growth of steel per kelvin."""
+"""Step and smallest error of a workpiece temperature, K; thermal expansion of steel, 1/K."""
 
 
 def at_first_sight(
     measurements: tuple[Measurement, ...], machine: Machine, now: Misfit, held_um: float
 ) -> Iterator[tuple[float, Mistake]]:
-    """Mistakes that change what the file says by a known column, or the values: with what is left to first order."""
+    """Mistakes that change the prediction by a known column, or the values; each with its residual to first order, um.
+
+    held_um  prior standard deviation of the constants, um
+    """
     rest, problem = FirstOrder.of(now, held_um), now.problem
     shown = [
         problem.um * (problem_design @ np.asarray(effect.coefficients)) for effect, problem_design in _designs(problem)
@@ -72,7 +75,7 @@ def at_first_sight(
 
 
 def _designs(problem: Problem) -> list[tuple[Effect, Array]]:
-    """Each effect of the file with its columns (m, p), mm."""
+    """Each effect of the file with its design (m, p), mm."""
     effects = problem.machine.effects
     every = np.concatenate([each.design(effects) for each in problem.observations])
     starts = np.cumsum([0, *(effect.basis.size for effect in effects)])
@@ -82,7 +85,7 @@ def _designs(problem: Problem) -> list[tuple[Effect, Array]]:
 
 
 def _scalings(machine: Machine) -> Iterator[tuple[float, tuple[int, ...], str, str, str]]:
-    """Factor of some effects of the file, which ones, name, title and axis."""
+    """Mistakes that scale effects of the file: (factor, indices of the effects, name, title, axis)."""
     effects = machine.effects
     if machine.is_perfect:
         return
@@ -116,7 +119,7 @@ def _scalings(machine: Machine) -> Iterator[tuple[float, tuple[int, ...], str, s
 def _one_sided(
     measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder, shown: Sequence[Array]
 ) -> Iterator[tuple[float, Mistake]]:
-    """A table of an axis over itself that the control adds only where the axis moves one way."""
+    """A table of an axis that is already active in the control, but in one direction of motion only."""
     if any(each.kind not in ("tcp", "tcp6") for each in measurements):
         return
     seen = rest.now.problem.observations
@@ -146,7 +149,7 @@ def _one_sided(
 def _of_values(
     measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder
 ) -> Iterator[tuple[float, Mistake]]:
-    """Measured values of another sign, unit or column."""
+    """Mistakes of measured values: sign, unit, exchanged columns."""
     names = list(dict.fromkeys(name for each in measurements for name in each.measured))
     offered = [
         undone_by_columns(
@@ -186,10 +189,10 @@ def _of_values(
 
 @frozen(repr=False, slots=False)
 class FirstOrder:
-    """The misfit of a file to first order: its set-up free, its constants nearly fixed.
+    """The misfit of a file to first order, with a free set-up and nearly fixed constants.
 
-    y         (m,) values minus what the file says, um
-    basis     orthonormal columns of what is free, with the rows of the prior below, (m + k, r)
+    y         (m,) values minus the prediction of the file, um
+    basis     (m + k, r) orthonormal columns of the free parameters, with the rows of the prior below
     """
 
     now: Misfit
@@ -198,7 +201,7 @@ class FirstOrder:
 
     @staticmethod
     def of(now: Misfit, held_um: float) -> FirstOrder:
-        """About the first guess of the set-up, constants held within so much."""
+        """Linearize about the first guess of the set-up; `held_um`: prior standard deviation of the constants."""
         problem = now.problem
         scale = (problem.um / now.relative)[:, None]
         free, own = scale * problem.nuisance(problem.start), scale * problem.design
@@ -211,7 +214,7 @@ class FirstOrder:
         return FirstOrder(now, y, orthonormal(columns))
 
     def of_values(self, measurements: Sequence[Measurement]) -> Array:
-        """(m,) other values minus what the file says, um."""
+        """(m,) the values of corrected measurements minus the prediction of the file, um."""
         problem = self.now.problem
         pairs = zip(measurements, problem.observations, strict=True)
         values = np.concatenate([
@@ -223,24 +226,24 @@ class FirstOrder:
         return self.y + problem.um * (values - problem.values)
 
     def of_places(self, measurements: Sequence[Measurement]) -> Array:
-        """(m,) values minus what the file says at other positions, or with other tools, um."""
+        """(m,) values minus the prediction of the file for corrected positions or tools, um."""
         seen = Problem.of(measurements, self.now.problem.machine, self.now.problem.selection)
         return seen.um * seen.residual(seen.selection.start, seen.start)
 
     @property
     def rows(self) -> Ints:
-        """(m,) the row of each value among those of all files; the first for what has none."""
+        """(m,) index of the row of each value among the rows of all files; 0 for calibrated distances."""
         return np.maximum(rows_of(self.now.problem), 0)
 
     def amounts(self, columns: Array) -> Array:
-        """(k,) how much of each column (m, k) is to be added to the values so that least is left."""
+        """(k,) factors of columns (m, k), um, which added to the values minimize the residual."""
         scaled = np.column_stack([self.y, columns]) / self.now.relative[:, None]
         below = np.zeros((len(self.basis) - len(scaled), scaled.shape[1]))
         rest = without(self.basis, np.concatenate([scaled, below]))
         return np.asarray(np.linalg.lstsq(rest[:, 1:], -rest[:, 0], rcond=None)[0], dtype=np.float64)
 
     def left(self, y: Array) -> float:
-        """Root mean square of what these values leave, um, without the largest."""
+        """Root mean square residual of the values y (m,), um, without the largest."""
         scaled = np.concatenate([y / self.now.relative, np.zeros(len(self.basis) - len(y))])
         rest = np.abs(without(self.basis, scaled[:, None])[:, 0])
         kept = np.sort(rest[: len(y)])[: self.now.count]
@@ -248,26 +251,26 @@ class FirstOrder:
 
 
 def points_of_axes(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> list[Mistake]:
-    """Axis points that the data have elsewhere than the machine file, by more than axes move."""
+    """Mistakes of axis points: rotary axes whose point in the file is further off than axes move."""
     moved = [_pivot(measurements, machine, axis) for axis in machine.axes if axis.rotary]
     return [each for each in moved if each is not None]
 
 
 def looking_like_constants(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[Mistake]:
-    """The mistakes that constants which moved explain as well: readings of a probe that shrink are all near a ball."""
+    """Mistakes that changed constants could imitate: axis points, and units of positions that were read by a probe."""
     yield from points_of_axes(measurements, machine, now)
     if any(each.kind == "probe" for each in measurements):
         yield from units(measurements, machine)
 
 
 def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[Mistake]:
-    """Mistakes of positions, tools and axes, whose effect is not of first order."""
+    """Mistakes of positions, tools and axes, which need a new fit."""
     yield from points_of_axes(measurements, machine, now)
     if any(each.kind not in DEVIATIONS for each in measurements):
         yield from units_of_values(measurements, machine)
     yield from units_of_one_file(measurements, machine)
     if any("radius" in each.columns for each in measurements):
-        return  # circles: the bar's length says where the axes were
+        return  # the length of a ball-bar confirms the axis positions
     yield from units(measurements, machine)
     yield from _exchanged_axes(measurements, machine)
     for axis in machine.axes:
@@ -292,7 +295,7 @@ def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine, 
 
 
 def _exchanged_axes(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Columns of positions of two axes under each other's names."""
+    """Mistakes of exchanged position columns of two axes."""
     for kind in (False, True):
         names = [axis.name for axis in machine.axes if axis.rotary == kind]
         for first, second in combinations(names, 2):
@@ -308,7 +311,7 @@ def _exchanged_axes(measurements: tuple[Measurement, ...], machine: Machine) -> 
 def _tools(
     measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder
 ) -> Iterator[tuple[float, Mistake]]:
-    """A tool of another length than was stated, all of another unit, or two of them exchanged."""
+    """Mistakes of tool lengths: wrong, in another unit, or exchanged between two tools."""
     if any("tool_length" not in each.columns for each in measurements):
         return
     lengths = sorted({float(x) for each in measurements for x in each.column("tool_length")})
@@ -335,7 +338,7 @@ def _tools(
 
 
 def _unstated_tools(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Tools of which no length is stated: each set of rows with a tool of its own."""
+    """The mistake of missing tool lengths, if every set of rows has a tool of its own."""
     names = list(dict.fromkeys(name for each in measurements for name in each.sets))
     if any(each.column("tool_length").any() for each in measurements) or not 1 < len(names) <= MOST_SETS:
         return
@@ -359,7 +362,7 @@ def _lengths(measurements: tuple[Measurement, ...], change: Callable[[Array], Ar
 
 
 def _warm(measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOrder) -> Iterator[tuple[float, Mistake]]:
-    """The workpiece or artefact was warmer than it should be: all it shows grows from a point that the set-up has."""
+    """The mistake of a workpiece or artefact at a wrong temperature, so that all its coordinates are scaled."""
     if any(each.kind != "tcp" or not set(each.measured) & {"dx", "dy", "dz"} for each in measurements):
         return
     column = (rest.of_values(_grown(measurements, machine, WARM_STEP_K)) - rest.y) / WARM_STEP_K
@@ -374,7 +377,7 @@ def _warm(measurements: tuple[Measurement, ...], machine: Machine, rest: FirstOr
 
 
 def _grown(measurements: tuple[Measurement, ...], machine: Machine, kelvin: float) -> tuple[Measurement, ...]:
-    """The measurements less what a workpiece of steel grows by."""
+    """The measurements less the thermal expansion of a workpiece of steel."""
     found = []
     for each in measurements:
         tip = machine.tip(each.positions(machine), each.column("tool_length"))
@@ -388,7 +391,7 @@ def _grown(measurements: tuple[Measurement, ...], machine: Machine, kelvin: floa
 
 
 def _pivot(measurements: tuple[Measurement, ...], machine: Machine, axis: Axis) -> Mistake | None:
-    """The axis point moved to where the data have it."""
+    """The mistake of a wrong axis point, corrected by the data; None if the point is right."""
     located = [Effect(f"E{letter}0{axis.name}", (0.0,)) for letter in "XYZ"]
     moved, point = machine, np.asarray(axis.point)
     for _ in range(PIVOT_STEPS):
@@ -418,7 +421,7 @@ def _pivot(measurements: tuple[Measurement, ...], machine: Machine, axis: Axis) 
 
 
 def _other_machine(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[Mistake]:
-    """The file of another machine with the same axes: nothing of its errors holds; its constants are fitted anew."""
+    """The mistake of a file of another machine with the same axes: no curve holds, and its constants are refitted."""
     for fitted, count, gained in without_foreign_tables(measurements, machine, now):
         title = "another machine: nothing of the file's tables holds; it is another machine's file, or out of date"
         yield Mistake("another machine", title, "", fitted, measurements, fitted=count, replaces=True, gained=gained)

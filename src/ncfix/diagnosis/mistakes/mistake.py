@@ -1,4 +1,4 @@
-"""A mistake of people or software: machine file and measurements as they would be without it."""
+"""A mistake of people or software, with machine file and measurements as they are without it."""
 
 from __future__ import annotations
 
@@ -11,21 +11,20 @@ from ncfix.values import frozen
 
 @frozen(repr=False, slots=False)
 class Mistake:
-    """A mistake, and machine and measurements as they are without it.
+    """A mistake, with machine and measurements corrected for it.
 
-    before_um, after_um  misfit with it and without it
-    likely               the file itself looks like it
-    aliases              mistakes of its kind that explain the data as well
-    stretch              values of the file are to be multiplied with this: densities are stretched by as much
-    fitted               how many numbers were fitted to undo it
-    replaces             the constants of the file are other ones, too: taken where its own do not agree with the data
-    given_um             rms of the lengths that the file as given leaves
-    odds, paid           log odds against the file as given, after what the mistake pays
-    sure                 it reaches the noise: no names do better
-    gained               log odds before it pays, where it is sure though the noise is not reached
-    torn                 a mistake that explains the data as well is in the data, and this in the machine file, or the
-                         other way round: no file is right for both
-    remedy               what to do about it, where its title does not say so
+    before_um, after_um  residual with and without it, um
+    likely               the file itself suggests it
+    aliases              names of mistakes or constants that explain the data as well
+    stretch              factor by which the values must be multiplied, if their unit is wrong
+    fitted               number of parameters fitted to undo it
+    replaces             it also replaces the constants of the file
+    given_um             rms residual length with the given file, um
+    odds, paid           log odds against the given file, less its price; and that price
+    sure                 undoing it leaves only noise, or nearly: no names can do better
+    gained               log odds before the price, if these do not follow from the residual
+    torn                 equally good mistakes are in the data and in the machine file: no corrected file is written
+    remedy               what to do about it, unless the title says so
     """
 
     name: str
@@ -53,7 +52,10 @@ def undone_by_columns(
     name: str, title: str, machine: Machine, measurements: tuple[Measurement, ...],
     columns: dict[str, tuple[str, float]], stretch: float = 1.0,
 ) -> Mistake:  # fmt: skip
-    """A mistake that is undone by columns taken from others, times a factor."""
+    """A mistake that is undone by replacing columns.
+
+    columns  new column -> (column to take it from, factor)
+    """
     changed = tuple(
         each.with_columns({to: factor * each.columns[of] for to, (of, factor) in columns.items() if of in each.columns})
         for each in measurements
@@ -62,7 +64,7 @@ def undone_by_columns(
 
 
 def times(measurements: tuple[Measurement, ...], axes: Sequence[str], factor: float) -> tuple[Measurement, ...]:
-    """The columns of these names, and measured positions of these axes, times a factor."""
+    """The measurements with the columns of these names (and `mx` ... of these axes) multiplied by a factor."""
     names = {*axes, *(f"m{axis.lower()}" for axis in axes)}
     return tuple(
         each.with_columns({name: factor * values for name, values in each.columns.items() if name in names})

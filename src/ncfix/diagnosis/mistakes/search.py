@@ -1,8 +1,7 @@
-"""Mistakes of people and software: the machine is as it is, and somebody told the computer otherwise.
+"""Search for mistakes in machine file or measurements: wrong signs, units, columns, tables, tools or axis points.
 
-Each mistake is undone in turn, and it is looked how well the machine file as it stands, its constants nearly fixed,
-then agrees with the data. A mistake that is real explains nearly all at once, with nothing fitted: no missing effect
-does.
+Each mistake is undone in turn, and the machine file is compared with the data with its constants nearly fixed. A real
+mistake explains nearly the whole misfit at once without fitting anything; no missing effect does.
 """
 
 from __future__ import annotations
@@ -34,33 +33,36 @@ from ncfix.machine import Machine
 from ncfix.measure.measurement import Measurement, component_of
 
 SUSPECT = 1.15
-"""Times the noise from which on a mistake is looked for."""
+"""Residual, in units of the noise, from which mistakes are sought."""
 OTHERWISE = 0.2
-"""Where constants that moved explain the data, a mistake leaves less than this share of the squares they explain."""
+"""If moved constants explain the data, a mistake must leave less than this share of the squares that they explain."""
 AS_STANDING = 1.5
-"""Times what is left that constants of the file may leave more when they are not moved."""
+"""Largest ratio of the residual with unmoved constants to that with constants nearly fixed, for a file that agrees."""
 AS_SIMPLE = 1.03
-"""Of mistakes that leave no more than this times the least, the simplest is taken."""
+"""Among mistakes whose residual is within this factor of the smallest, the simplest is chosen."""
 TRIED = 8
-"""Of mistakes that can be judged to first order so many, the best, are judged exactly."""
+"""Number of mistakes, the best to first order, that are evaluated exactly."""
 NAMES_COST = 25.0
-"""What names pay at least, log odds: a mistake that reaches the noise is never worse."""
+"""Smallest price of names, log odds: within it of the noise, no names can do better than a mistake."""
 A_LITTLE_UM = 0.6
-"""What machines have of everything, of one value: the noise is never reached closer."""
+"""Small effects that every machining centre has, um per value: no closer to the noise can a file come."""
 PLAUSIBLE_UM, DECADE = 3.0, float(np.log(10.0))
-"""Usual noise of a value, and the spread of its logarithm: a unit may be wrong where noise is a thousand times that."""
+"""Usual residual of a value, um, and standard deviation of its logarithm: the prior that makes wrong units unlikely."""
 TYPED = 5.0
-"""Log odds beforehand for a mistake that the file itself looks like."""
+"""Prior log odds for a mistake that the file itself suggests (`Mistake.likely`)."""
 TINY_UM = 1e-6
 TORN = "the machine file is wrong, or the readings are: no file is written until it is known which"
 ALIAS_LOG_ODDS = 3.0
 """Log odds (20 to 1) within which another mistake explains the data as well."""
 FIRST_SIGHT = 5.0
-"""Mistakes that are less likely by so much, to first order, are not looked at again."""
+"""Mistakes with log odds below minus this, to first order, are not evaluated exactly."""
 
 
 def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str] = ()) -> Mistake | None:
-    """The mistake that explains the data better than the file as it stands, if one does: by log odds."""
+    """The mistake that explains the data best, if one has positive log odds against the given file.
+
+    refused  names of mistakes that must not be used
+    """
     measurements = tuple(measurements)
     now = misfit(measurements, machine)
     tried = _suspects(measurements, machine, now, {plain(name) for name in refused})
@@ -88,10 +90,10 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
 def _suspects(
     measurements: tuple[Measurement, ...], machine: Machine, now: Misfit, refused: Collection[str]
 ) -> list[Mistake]:
-    """Mistakes that may be behind what the file leaves, with their log odds.
+    """Mistakes that may explain the misfit, with their log odds.
 
-    If none is likely, but constants of the file would have to move to explain the data: those that spare them that. In
-    inches a squareness is one of 25.4 times the size, so then units of positions are asked for, too. What is left is
+    If none is likely, but the constants of the file must move to explain the data, mistakes that make this unnecessary
+    are sought. These include units of positions, since inches make a squareness 25.4 times as large. Residuals are
     compared in the unit of the file.
     """
     left, standing = now.left(), now.left(AS_IT_STANDS_UM)
@@ -111,10 +113,10 @@ def _suspects(
 
 
 def _simplest(alike: Sequence[Mistake], others: Sequence[Mistake]) -> Mistake:
-    """The simplest of mistakes that explain the data alike.
+    """The simplest of mistakes that explain the data equally well.
 
-    If the file does not agree with the data once that is undone, the likeliest point of an axis with which it does; or
-    else of `others`, with which its constants are other ones.
+    If the file, with that undone, does not agree with the data: the likeliest wrong axis point with which it does, or
+    else the likeliest of `others`, which replace the constants of the file.
     """
     simplest = min(alike, key=lambda each: (each.fitted, -each.odds))
     if (others or len(alike) > 1) and not _stands(simplest):
@@ -124,7 +126,7 @@ def _simplest(alike: Sequence[Mistake], others: Sequence[Mistake]) -> Mistake:
 
 
 def _sense(measurements: Sequence[Measurement], machine: Machine) -> str:
-    """How the sign of a laser's deviations is meant, where some were given."""
+    """A remark on the sign convention of positioning deviations, if the files have any; else ""."""
     read = {
         component
         for each in measurements
@@ -141,7 +143,10 @@ def _judged(
     measurements: tuple[Measurement, ...], machine: Machine, now: Misfit, held_um: float,
     deep: Sequence[Mistake], refused: Collection[str],
 ) -> list[Mistake]:  # fmt: skip
-    """Mistakes with their log odds, constants held within so much: the best at first sight, and all of `deep`."""
+    """Mistakes with their log odds: the best ones to first order, and all of `deep`.
+
+    held_um  prior standard deviation of the constants, um
+    """
     quick = [each for each in at_first_sight(measurements, machine, now, held_um) if plain(each[1].name) not in refused]
     count, before = len(quick) + len(deep), now.left(held_um)
     sighted = [(_odds(left, before, each, now, now, count), each) for left, each in quick]
@@ -161,14 +166,14 @@ def _paid(mistake: Mistake, now: Misfit, count: int) -> float:
 
 
 def _weight(left: float, stretch: float, now: Misfit) -> float:
-    """Log likelihood of the values as they are in the file, where so much is left of them, um, once stretched."""
-    scatter = float(np.log(now.relative).mean())  # a file of another unit has other repeats, too
+    """Log likelihood of the values in the file, given the residual `left`, um, of the values times `stretch`."""
+    scatter = float(np.log(now.relative).mean())  # another unit changes the noise from repeats, too
     fit = -now.count * (float(np.log(max(left, TINY_UM))) + scatter - float(np.log(stretch)))
     return fit - 0.5 * (float(np.log(max(left, TINY_UM) / PLAUSIBLE_UM)) / DECADE) ** 2
 
 
 def _tried(mistake: Mistake, before: float, now: Misfit, count: int, held_um: float) -> Mistake:
-    """The mistake with what undoing it leaves, constants held within so much, and its log odds."""
+    """The mistake with its residual after being undone, constants held within `held_um`, and its log odds."""
     try:
         undone = misfit(mistake.measurements, mistake.machine)
         left = undone.left(held_um)
@@ -180,13 +185,13 @@ def _tried(mistake: Mistake, before: float, now: Misfit, count: int, held_um: fl
 
 
 def _stands(mistake: Mistake) -> bool:
-    """Whether once it is undone the file agrees with the data about as well as with its constants moved a little."""
+    """Whether, with the mistake undone, the file agrees with the data without moving its constants."""
     left = misfit(mistake.measurements, mistake.machine).left(AS_IT_STANDS_UM)
     return left < AS_STANDING * mistake.after_um
 
 
 def _reaches_noise(mistake: Mistake, now: Misfit) -> bool:
-    """Whether the file as it stands, its constants not fitted, is at the noise once the mistake is undone."""
+    """Whether, with the mistake undone, the residual of the file is the noise without fitting its constants."""
     fixed = misfit(mistake.measurements, mistake.machine)
     still = _weight(max(mistake.after_um, fixed.left(AS_IT_STANDS_UM)), mistake.stretch, fixed) - mistake.paid
     little = A_LITTLE_UM * little_of(mistake.machine, fixed.noise)
@@ -195,8 +200,9 @@ def _reaches_noise(mistake: Mistake, now: Misfit) -> bool:
 
 
 def is_a_point_of(wrong: Mistake, constants: Collection[str]) -> bool:
-    """Whether a mistake moves the point of an axis that one of some constants moves: data cannot tell the two apart.
+    """Whether a mistake is a wrong axis point that one of the named constants could imitate.
 
-    Of these the point is put right: a constant in its place makes programs worse where the control has the right point.
+    The data cannot tell the two apart. The point is then corrected: a constant in its place would make programs worse
+    if the control has the right point.
     """
     return wrong.name.startswith(PIVOT) and not set(wrong.aliases).isdisjoint(constants)

@@ -1,4 +1,4 @@
-"""A table that was made before reference points were moved: the same curves, some way beside their place."""
+"""Error curves shifted along their axes, as in a table made before a reference point was moved."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.measurement import Measurement
 
 SHIFT_REACH = 0.16
-"""Of the travel measured: how far a table may be off."""
+"""Largest shift of a table, as a share of the measured travel."""
 SHIFTS = 33
-"""Shifts that are tried over that reach, to both sides; the middle one is none."""
+"""Number of shifts that are tried between minus and plus that; the middle one is zero."""
 OF_FILE = "stale table: the curves of the file belong some way beside: "
 OF_CONTROL = "stale table: the control corrects with a table shifted by "
 SHIFT_ROUNDS = 4
-"""How often the shift of each axis is chosen beside those of the others."""
+"""Rounds in which the shift of each axis is optimized given those of the others."""
 
 
 def shifted_tables(measurements: Sequence[Measurement], machine: Machine) -> Iterator[tuple[Machine, str]]:
-    """The machine with its curves at the likeliest other place, and with a control that corrects there."""
+    """Machines for two mistakes, each with a title: the file's curves are shifted, or those of the control's table."""
     seen = residual_data(measurements, machine)
     basis = orthonormal(seen.base / seen.relative[:, None])
     curves = {
@@ -45,7 +45,7 @@ def shifted_tables(measurements: Sequence[Measurement], machine: Machine) -> Ite
 
 
 def _shown(seen: ResidualData, basis: Array, curves: Sequence[Effect], ways: Array) -> Array:
-    """What curves of one axis show at every other place, beside what is free, (places, m)."""
+    """Effect on the values, (shifts, m), of an axis's curves at every shift in `ways`, mm, orthogonal to `basis`."""
     moved = [replace(e, center=e.center - float(way)) for way in ways for e in curves]
     values = np.concatenate([np.asarray(e.coefficients) for e in curves])
     designs = np.split(seen.design(moved), len(ways), axis=1)
@@ -66,7 +66,7 @@ def _left(basis: Array, values: Array) -> Array:
 
 
 def _found(y: Array, shown: dict[str, Array]) -> dict[str, int]:
-    """The place of each axis's curves that leaves least, one axis after another."""
+    """For each axis, the index of the shift of its curves that leaves the smallest residual."""
     chosen = dict.fromkeys(shown, SHIFTS // 2)
     for _ in range(SHIFT_ROUNDS):
         for name, rows in shown.items():

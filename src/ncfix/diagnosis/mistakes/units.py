@@ -20,39 +20,40 @@ from ncfix.measure.measurement import TURNS, Measurement, component_of
 
 UNIT_OF_VALUES = "unit of values"
 LARGE_RAD = 2e-4
-"""An angle above this may have been typed in degrees."""
+"""An error angle above this, rad, may have been typed in degrees."""
 TURN_RAD = 6.6
+"""Axis angles that nowhere exceed this may be in radians."""
 INCH = 25.4
 TINY = 1e-9
 LENGTHS, DEVIATIONS = ("dx", "dy", "dz", "value"), ("tcp", "tcp6", "axis")
 """Columns of measured deviations in mm, and the kinds of files that have them."""
 READINGS = ("x", "y", "z", "length")
-"""Columns in mm of what is no deviation: where targets are, and how long a gauge is. Those of probes are positions."""
+"""Measured columns in mm that are no deviations: target coordinates, and lengths. (Those of probes are positions.)"""
 UNITS_OF_LENGTH = {"": 1.0, "um": 1e-3, "m": 1e3, "inch": INCH, "thousandths of an inch": INCH / 1e3}
 UNITS_OF_ANGLE = {"": 1.0, "urad": 1e-6, "seconds of arc": np.pi / 648000, "mrad": 1e-3, "degrees": np.pi / 180}
-"""In what values may be given instead of mm and rad, and mm or rad per that."""
+"""Units that values may be in by mistake, in mm and rad; "" is the right unit."""
 USUAL_UM, USUAL_NOISE_UM, SPREAD = 5.0, 1.0, float(np.log(5.0))
-"""What machines have that a file lacks, rms, and noise of a value; and the spread of the logarithms of both.
+"""Usual residual of a machine file and usual noise, um, and the standard deviation of the logarithm of both.
 
-Two of three machines lie within a fifth and five times, as small machining centres and large ones do. Of 8 generated
-worlds of a laser (errors of 1.5 to 60 um, repeats of 0.15 to 2 um) whose file knows most of the curve every unit was
-named in all, and none that was right. Of 8 without a curve um were named in all, thousandths of an inch asked about in
-one. Metres and inches make values smaller, and good machines have those: no odds of sizes are enough, so what is too
-good is remarked on (checks.STEADY_UM, NCF616).
+Two of three machines, small and large, lie within a factor of five. Tested on 8 generated laser measurements (errors of
+1.5 to 60 um, repeats of 0.15 to 2 um): if the file knows most of the curve, every wrong unit was named, and no right
+one. Without a curve in the file, um was named in all 8; in one, the user is asked about thousandths of an inch. Metres
+and inches make values smaller, as good machines do, so sizes do not show these; values that are too good get a remark
+(checks.STEADY_UM, NCF616).
 """
 RARE = {"thousandths of an inch": float(np.log(100.0))}
-"""Log odds beforehand against a unit."""
+"""Prior log odds against a unit."""
 
 
 def in_usual_unit(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str]) -> Mistake | None:
-    """Of values that no machine errs by: the unit in which they would be usual; None where they are as machines err.
+    """The wrong unit of implausibly large values, as a mistake; None if the values are plausible as they are.
 
-    Raises `UsageError` NCF654 where there is no such unit, or more than one, which are named.
+    Raises `UsageError` NCF654 if no unit makes them plausible, or if several do (the hint names these).
     """
     try:
         sensible(measurements, machine)
     except UsageError as refusal:
-        told = all(each.kind == "axis" for each in measurements)  # what poses show may be that of another machine
+        told = all(each.kind == "axis" for each in measurements)  # other kinds may be of another machine
         found = _usual_units(tuple(measurements), machine) if told and UNIT_OF_VALUES not in refused else []
         found = [each for each in found if each.odds > found[0].odds - ALIAS_LOG_ODDS]
         if not found:
@@ -66,9 +67,7 @@ def in_usual_unit(measurements: Sequence[Measurement], machine: Machine, refused
 
 
 def _usual_units(measurements: tuple[Measurement, ...], machine: Machine) -> list[Mistake]:
-    """The units in which both what the machine file leaves and the noise would be usual ones, likeliest first, with the
-    log odds for each. Nothing else is known of such a file.
-    """
+    """The units that make residual and noise of the values usual, as mistakes with their log odds, likeliest first."""
     given, size = _usual(measurements, machine)
     offered = [*units_of_values(measurements, machine), *units_of_one_file(measurements, machine)]
     found = []
@@ -80,9 +79,7 @@ def _usual_units(measurements: tuple[Measurement, ...], machine: Machine) -> lis
 
 
 def _usual(measurements: tuple[Measurement, ...], machine: Machine) -> tuple[float, float]:
-    """How usual is what is left of these values, and the noise of files whose repeats tell it: log likelihood; and how
-    much is left, um rms.
-    """
+    """Log likelihood of the sizes of residual and noise of these values; and the residual, um rms."""
     now, large = misfit(measurements, machine), times_a_machining_centre(machine)
     noise = [float(np.median(each.um * each.sigma)) for each in now.problem.observations if each.noise_known]
     unusual = np.log(np.maximum([now.free / USUAL_UM, *(each / USUAL_NOISE_UM for each in noise)], TINY) / large)
@@ -90,7 +87,7 @@ def _usual(measurements: tuple[Measurement, ...], machine: Machine) -> tuple[flo
 
 
 def units_of_values(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Measured values in another unit than mm and rad."""
+    """Mistakes of measured values given in another unit than mm and rad."""
     turns = [_turns(each) for each in measurements]
     parts = [part for each in turns for part in each.values()]
     angles = sum(int(part.sum()) for part in parts)
@@ -113,7 +110,7 @@ def units_of_values(measurements: tuple[Measurement, ...], machine: Machine) -> 
 
 
 def _turns(measurement: Measurement) -> dict[str, Mask]:
-    """The measured columns that have a unit, and where in each an angle was measured."""
+    """For each measured column that has a unit, a mask of its rows that are angles."""
     found = {name: np.zeros(len(measurement), dtype=bool) for name in (*LENGTHS, *READINGS)}
     found |= {name: np.ones(len(measurement), dtype=bool) for name in TURNS}
     if measurement.kind == "axis":
@@ -123,14 +120,14 @@ def _turns(measurement: Measurement) -> dict[str, Mask]:
 
 
 def units_of_tools(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Lengths of tools in another unit than mm."""
+    """Mistakes of tool lengths given in another unit than mm."""
     for unit, factor in (("m", 1e3), ("inch", INCH)):
         title = f"tool length: the lengths of the tools are in {unit}, not in mm"
         yield Mistake("tool length", title, "", machine, times(measurements, ["tool_length"], factor))
 
 
 def units_of_one_file(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Mistakes of units in one of several files."""
+    """Mistakes of units in a single one of several files."""
     values = [len(each) * len(each.measured) for each in measurements]
     for k, each in enumerate(measurements) if len(measurements) > 1 else ():
         offered = [*units((each,), machine), *units_of_values((each,), machine)]
@@ -145,7 +142,7 @@ def units_of_one_file(measurements: tuple[Measurement, ...], machine: Machine) -
 
 
 def units(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
-    """Positions in another unit than mm and degree, and angles of the machine file that were typed in degrees."""
+    """Mistakes of axis positions in another unit than mm and degree, and of machine file angles typed in degrees."""
     linear = [axis.name for axis in machine.axes if not axis.rotary]
     for name, said, factor in (("inch", "inches", INCH), ("metre", "metres", 1e3), ("um", "micrometres", 1e-3)):
         changed = times(measurements, linear, factor)
@@ -162,7 +159,7 @@ def units(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[M
 
 
 def looks_typed(effect: Effect) -> bool:
-    """Whether an angle is so large that it may have been typed in degrees."""
+    """Whether an effect is an angle so large that it may have been typed in degrees."""
     return effect.rotational and max(map(abs, effect.coefficients), default=0.0) > LARGE_RAD
 
 
@@ -174,7 +171,7 @@ def _in_radians(machine: Machine, index: int) -> Machine:
 
 
 def _stretch(measurements: tuple[Measurement, ...], axes: Sequence[str], factor: float) -> float:
-    """By how much the readings are stretched: those of a probe are positions of axes."""
+    """Factor on the readings, geometric mean, if positions of these axes are scaled: a probe reads axis positions."""
     names = {*axes, *(f"m{axis.lower()}" for axis in axes)}
     shares = [len(names & set(each.measured)) / max(len(each.measured), 1) for each in measurements]
     return float(factor ** np.mean(shares))
