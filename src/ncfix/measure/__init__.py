@@ -1,5 +1,5 @@
-"""The floor of measurements: files, instruments' observation models, calibration, plans, simulated measurements.
+"""Measurements: files, observation models of instruments, calibration, measurement plans, simulated measurements.
 
-`reader.read` gives a `Measurement`, `instruments.observe` the instrument's view of it, `calibrate.calibrate` a
-calibrated machine, `plan.plan` the poses to be measured, `instruments.simulate` a measurement that never was.
+`reader.read` returns a `Measurement`, `instruments.observe` its observation model, `calibrate.calibrate` a calibrated
+machine, `plan.plan` the poses to measure, `instruments.simulate` a simulated measurement.
 """

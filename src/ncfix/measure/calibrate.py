@@ -1,7 +1,7 @@
-"""Calibration: from measurements to a machine whose errors are known, and what has to be said about it.
+"""Calibration: estimate the errors of a machine from measurements, with remarks on the result.
 
-`calibrate` estimates by weighted least squares on the exact model (`ncfix.measure.estimate`). Besides the machine it
-gives what the measurements cannot tell, in words; `over_the_travels` says how well the error of the tool tip is known.
+`calibrate` estimates by weighted least squares on the exact model (`ncfix.measure.estimate`). The remarks name what the
+measurements cannot determine. `over_the_travels` gives the uncertainty of the predicted tip error.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from ncfix.values import frozen
 from ncfix.version import __version__
 
 ALIKE = 0.02
-"""Factors this near to 1 or -1 count as such."""
+"""Largest difference from 1 or -1 at which a factor is printed as a plain sum or difference."""
 NAMED = 20
-"""Outliers, and coefficients left out, that are named one by one."""
+"""Largest number of outliers, and of omitted coefficients, that are named one by one."""
 PLACES = 400
-"""Poses over the travels at which the tip error is predicted."""
+"""Number of poses over the travels at which the uncertainty of the tip error is predicted."""
 UM = 1e3
 FURTHER, LONGER = 200, 100.0
-"""Poses, and mm of a tool, with which it is asked what more measurements of a kind would tell."""
+"""Number of further poses, and mm by which the longest tool is exceeded, to find what more measurements would show."""
 SEPARATE = "`ncfix plan --separate` finds poses that tell them apart"
 APART = "more poses of this kind do not tell them apart: another instrument may, or a set-up that is known"
 
@@ -55,8 +55,8 @@ def calibrate(
     effects  names, patterns, `all` or a model, see `ncfix.measure.selection`; None: those that the machine has
     loss     auto (gross outliers get no weight), none, huber or tukey
     prune    significance, e.g. 0.99, that a coefficient must have to stay; None keeps all
-    knots    of new error motions of linear axes, which are cubics without; those that do not matter go with `prune`
-    time_constants  estimate those of effects that lag, too
+    knots    number of knots of new error motions of linear axes; 0: cubics. `prune` removes insignificant knots
+    time_constants  also estimate the time constants of effects with a lag
 
     Raises `UsageError` NCF025, NCF630, NCF635, NCF637, NCF639, and `RefusedError` NCF623.
     """
@@ -100,7 +100,7 @@ def calibrate(
 
 
 def _point(measurements: Sequence[Measurement]) -> list[float] | None:
-    """The point at which errors were measured directly, if one was given."""
+    """The point at which error motions were read directly, mm, if the files of kind axis state one and the same."""
     texts = {measurement.header("point") for measurement in measurements if measurement.kind == "axis"} - {""}
     return [float(part) for part in texts.pop().split()] if len(texts) == 1 else None
 
@@ -123,7 +123,9 @@ def _machine(problem: Problem, estimate: Estimate, scale: float, figures: dict[s
 
 
 def _known(effect: Effect, covariance: Array) -> Effect:
-    """The effect with its covariance, if all of its coefficients were estimated; that of the file if all are held."""
+    """The effect with its covariance if all coefficients were estimated, with that of the file if all were held, else
+    without one.
+    """
     if np.isnan(covariance).all():
         return effect
     if not np.isfinite(covariance).all():
@@ -133,13 +135,13 @@ def _known(effect: Effect, covariance: Array) -> Effect:
 
 
 def _rms(residuals: Residuals, values: Array, keep: Mask) -> float:
-    """The rms of lengths among values (m,) mm, calibrated distances apart, in um; NaN if there are none."""
+    """RMS, um, of the lengths among values (m,) mm, without calibrated distances; NaN if there is none."""
     chosen = values[(residuals.row >= 0) & ~residuals.turns & keep]
     return float(UM * np.sqrt((chosen**2).mean())) if chosen.size else np.nan
 
 
 def _rms_before(problem: Problem, residuals: Residuals) -> float:
-    """As `_rms`, about the machine as it was, with the set-up fitted."""
+    """As `_rms`, of the residuals of the given machine with its set-up fitted."""
     residual = problem.residual(problem.selection.start, problem.start) / problem.sigma
     basis = orthonormal(problem.nuisance(problem.start) / problem.sigma[:, None])
     return _rms(residuals, without(basis, residual) * problem.sigma, np.ones(len(residual), dtype=bool))
@@ -174,8 +176,9 @@ def _noise(problem: Problem, scale: float) -> Iterator[Message]:
 
 
 def _told_by_more(problem: Problem, solution: Solution) -> frozenset[int]:
-    """Which coefficients more poses of the kinds that were measured would tell, all over the travels and with a longer
-    tool besides; nothing is asked where nothing is confounded.
+    """Coefficients that more poses of the measured kinds would determine, over all travels and with a longer tool.
+
+    Empty if the data confound nothing.
     """
     old, more = [each.measurement for each in problem.observations], []
     for each in old if solution.combinations else ():
@@ -195,7 +198,10 @@ def _told_by_more(problem: Problem, solution: Solution) -> frozenset[int]:
 
 
 def untold(solution: Solution, labels: Sequence[str], told_by_more: Collection[int] = ()) -> list[Message]:
-    """What could not be told, and what was found instead; of what more poses would tell, the hint says so."""
+    """Remarks on coefficients that were held because the data do not determine them, alone or in combinations.
+
+    told_by_more  coefficients that more poses would determine, for the hint
+    """
     found = _unseen(_listed(solution.unseen, labels), "nothing that was measured depends on")
     found += _unseen(_listed(solution.set_up, labels), "the unknown set-up takes the place of")
     for each in solution.combinations:
@@ -219,7 +225,7 @@ def _unseen(names: Sequence[str], why: str) -> list[Message]:
 
 
 def _listed(held: Sequence[int], labels: Sequence[str]) -> list[str]:
-    """The coefficients by their names; where all of an effect's are held, the effect by its own."""
+    """Names of held coefficients; an effect of which all are held is named as a whole."""
     free = {name.split()[0] for k, name in enumerate(labels) if k not in set(held)}
     names = [labels[k] for k in held]
     return list(dict.fromkeys(name if name.split()[0] in free else name.split()[0] for name in names))
@@ -236,7 +242,7 @@ def _combined(combination: Combination, labels: Sequence[str], hint: str) -> Mes
 
 
 def _what(combination: Combination, held: str, names: Sequence[str]) -> str:
-    """What of a combination is determined: each of the others plus its factor times the held one."""
+    """The determined combination in words: each of the others plus its factor times the held coefficient."""
     signs = ["+" if factor > 0 else "-" for factor in combination.factors]
     alike = [abs(abs(factor) - 1) < ALIKE for factor in combination.factors]
     if len(names) == 1 and alike[0]:
@@ -250,9 +256,10 @@ def _what(combination: Combination, held: str, names: Sequence[str]) -> str:
 
 @frozen(eq=False)
 class Prediction:
-    """The standard deviation of the predicted tip error, um, the largest of three directions at each pose.
+    """Standard deviation of the predicted tip error over the travels, um, the largest of x, y, z at each pose.
 
-    What was held counts as known; other signals than positions are taken where they were in the middle of the data.
+    worst_um, rms_um  maximum and root mean square over the poses; at: the worst pose, mm and degree
+    Held coefficients count as known. Inputs other than positions are at the median of the data.
     """
 
     worst_um: float
@@ -261,7 +268,7 @@ class Prediction:
 
 
 def over_the_travels(calibration: Calibration) -> Prediction:
-    """At poses all over the travels, with the tools that were measured with."""
+    """The uncertainty of the predicted tip error at poses over all travels, with the tools of the measurements."""
     machine = calibration.problem.machine
     lengths = {
         float(length) for each in calibration.problem.observations for length in each.measurement.column("tool_length")
@@ -275,7 +282,7 @@ def over_the_travels(calibration: Calibration) -> Prediction:
 
 
 def guesses(calibration: Calibration, over: Prediction) -> tuple[Message, ...]:
-    """A warning (NCF641) if somewhere in the travels the tip error is known to less than what was to be corrected."""
+    """A warning (NCF641) if the uncertainty of the tip error anywhere exceeds the rms error before calibration."""
     if not over.worst_um > calibration.before_um:
         return ()
     at = ", ".join(f"{name} {value:g}" for name, value in over.at.items() if name != "tool_length")
@@ -288,13 +295,13 @@ def guesses(calibration: Calibration, over: Prediction) -> tuple[Message, ...]:
 
 
 def deviations(calibration: Calibration, q: Array, state: State) -> Array:
-    """Standard deviation of the predicted tip error at any poses, (n, 3) mm, directions of the workpiece frame."""
+    """Standard deviation of the predicted tip error at poses q (n, n_axes), (n, 3) mm, in the workpiece frame."""
     design = calibration.problem.machine.design(q, state, calibration.asked.estimated)
     return calibration.uncertainty(design[:, :3])
 
 
 def _inputs(calibration: Calibration, machine: Machine) -> dict[str, Array]:
-    """The middle of every signal that the estimated effects need."""
+    """The median of each input on which the estimated effects depend, for `PLACES` poses."""
     signals = (each for effect in calibration.asked.estimated for each in signals_of(machine.axes, effect))
     names = {name for signal in signals if signal is not None for name in signal.inputs} - {"tool_length"}
     values = {}

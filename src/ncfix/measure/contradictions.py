@@ -1,8 +1,8 @@
-"""Measurements of which no machine can be made: they contradict themselves or each other, or are mistaken.
+"""Measurements from which no machine file may be written: contradictory standards, too many outliers, a misfit.
 
-A stated standard is never an outlier: where two of them cannot both be true, nobody but their owner knows which one is
-wrong. Outliers are few; where they are many, or all of one set, it is no longer said which part of the data is right.
-A calibration that ran is none if it leaves what no machine with such an instrument can leave.
+A stated length is never treated as an outlier: if two of them contradict each other, only their owner knows which is
+wrong. Outliers must be few: if they are many, or most of one set, it is unclear which part of the data is right. A
+calibration is refused if its residuals are larger than any machine with such an instrument leaves.
 """
 
 from __future__ import annotations
@@ -20,44 +20,44 @@ from ncfix.measure.mistakes import ODD
 from ncfix.measure.selection import candidate_effects
 
 BEYOND = 1000.0
-"""Times the noise: missing effects leave some tens of it; this is a wrong unit, a wrong file or a wrong noise."""
+"""Residuals in units of the noise that mean a wrong unit, file or noise; missing effects leave some tens of it."""
 MUCH_UM = 100.0
-"""What is less may be an effect that is missing, however small the noise is that the file states."""
+"""Smaller residuals, um rms, may come from a missing effect, however small the stated noise is."""
 UM = 1e3
-FAR = 4.0
-"""Standard deviations that a stated length may be from what all others say."""
+MAX_SIGMAS = 4.0
+"""Largest deviation of a stated length from its prediction by all other data, in standard deviations."""
 LACKING = 0.1
-"""Of what is much: the standard deviation of each error that machines have and the model lacks."""
+"""Standard deviation of each error that the model lacks, in units of a large error (`plausible.much`)."""
 TOLD = 1e-6
-"""Of a value: what of it is less than this is told by no other value."""
+"""Smallest precision, in units of the noise, at which the other values predict a value at all."""
 MANY, FEW = 0.05, 4
-"""Share of the values that may be outliers; so many may be in any file."""
+"""Largest share of the values that may be outliers; this many are always allowed."""
 ALL = 0.5
-"""Share of the rows of a set that may be outliers."""
+"""Largest share of the rows of a set that may be outliers."""
 FEWEST = 4
-"""Rows that make a set of which something can be said, and a column that cannot be all the same."""
+"""Smallest number of rows for a test of a set, or of a column for equal values."""
 LACK = 5.0
-"""Times the noise: a large lack of fit."""
+"""Residuals in units of the noise that are a large lack of fit."""
 REFUSED = ("NCF617", "NCF621", "NCF622", "NCF623")
-"""Remarks with which no machine is written."""
+"""Remarks that forbid to write a machine file."""
 
 
 def refusals(calibration: Calibration, odd: Sequence[Doubt]) -> tuple[Message, ...]:
-    """Why no machine file may be written: data that contradict each other, a misfit, or a machine that cannot be."""
+    """Reasons why no machine file may be written: contradictory data, a misfit, or an impossible machine (`odd`)."""
     found = misfit(calibration)
     impossible = tuple(doubt.message for doubt in odd if doubt.impossible)
     return (*_contradictions(calibration), *(() if found is None else (found,)), *impossible)
 
 
 def _contradictions(calibration: Calibration) -> tuple[Message, ...]:
-    """What was remarked that forbids to make a machine, and what is odd about data that do not fit."""
+    """The calibration's remarks that forbid a machine file; with a large lack of fit, also those on odd data."""
     codes = {*REFUSED, *(ODD if np.sqrt(calibration.chi_square) > LACK else ())}
     remarks = calibration.remarks
     return tuple(sorted((each for each in remarks if each.code in codes), key=lambda each: each.code in ODD))
 
 
 def misfit(calibration: Calibration) -> Message | None:
-    """NCF642 if the residuals are more than the machine may be corrected by, or many and `BEYOND` times the noise."""
+    """NCF642 if the residuals exceed `max_correction`, or both `MUCH_UM` and `BEYOND` times the noise; else None."""
     factor = float(np.sqrt(calibration.chi_square)) if calibration.problem.noise_known else 0.0
     most_um = UM * float(calibration.machine.max_correction[0])
     beyond = factor > BEYOND and calibration.after_um > MUCH_UM
@@ -76,13 +76,13 @@ def misfit(calibration: Calibration) -> Message | None:
 
 
 def conflicts(problem: Problem, estimate: Estimate) -> Iterator[Message]:
-    """What of these data cannot all be true."""
+    """NCF621 and NCF622: stated lengths or sets of rows that contradict the other data."""
     yield from _standards(problem, estimate)
     yield from _outlying(problem, estimate)
 
 
 def untouched(measurement: Measurement) -> Message | None:
-    """NCF623 if nothing was measured: all values of a column are the very same."""
+    """NCF623 if nothing was measured: in every measured column all values are equal."""
     same = [name for name in measurement.measured if np.ptp(measurement.columns[name]) == 0]
     if len(measurement) < FEWEST or len(same) < len(measurement.measured) or not same:
         return None
@@ -92,11 +92,10 @@ def untouched(measurement: Measurement) -> Message | None:
 
 
 def _standards(problem: Problem, estimate: Estimate) -> Iterator[Message]:
-    """NCF621 if the others and the readings deny a stated length, by what is predicted of it without it.
+    """NCF621 if a stated length deviates too far from its prediction by all other data.
 
-    Real machines have all errors of ISO 230-1, a model some of them. What it lacks bends a distance more than it
-    shows in the readings, since the balls move with it. So the errors that it lacks may be there, too, in the sizes
-    that machines have, and readings that show one tell how much it bends a distance: a Gaussian prior on them.
+    Real machines have all errors of ISO 230-1, the model only some. A lacking error changes a distance more than the
+    readings, since the balls move with it. So the lacking errors are included with a Gaussian prior of usual size.
     """
     stated = np.flatnonzero(problem.stated)
     if not stated.size:
@@ -117,7 +116,7 @@ def _standards(problem: Problem, estimate: Estimate) -> Iterator[Message]:
     told = np.maximum(np.diag(precision), TOLD)
     far = np.where(np.diag(precision) > TOLD, np.abs(pull) / (factor * np.sqrt(told)), 0.0)
     at = int(np.argmax(far))
-    if far[at] <= FAR:
+    if far[at] <= MAX_SIGMAS:
         return
     missed = 1e3 * pull[at] / told[at] * problem.sigma[stated[at]]
     text = (
@@ -129,7 +128,7 @@ def _standards(problem: Problem, estimate: Estimate) -> Iterator[Message]:
 
 
 def _lacking(problem: Problem, estimate: Estimate) -> Array:
-    """What errors do that machines have and that are not estimated, each as large as what is much of it: (m, k), mm."""
+    """Design (m, k) of the errors that are not estimated, each scaled to a large error of this machine, mm or rad."""
     machine, selection = problem.machine, problem.selection
     there = {(effect.name, effect.basis) for effect in selection.estimated}
     others = [effect for effect in candidate_effects(machine) if (effect.name, effect.basis) not in there]
@@ -140,7 +139,7 @@ def _lacking(problem: Problem, estimate: Estimate) -> Array:
 
 
 def _outlying(problem: Problem, estimate: Estimate) -> Iterator[Message]:
-    """Outliers that are too many to be outliers."""
+    """NCF622 if outliers are too many, in all data or in one set."""
     aside = estimate.weight == 0
     if not aside.any():
         return

@@ -1,9 +1,9 @@
-"""Least squares on the exact model of a machine: the stacked problem, where its iteration ends, and what is left.
+"""Least squares on the exact model of a machine: the stacked problem, its solution and residuals.
 
-Each step solves the linear problem with the set-up eliminated (`ncfix.measure.least_squares`) and adds the change; the
-residual is always that of the exact, composed machine, so that what converges is the exact model. The Jacobian is that
-at the first guess, so that what cannot be told is the same in every step; its own error is of the size of the errors
-and does not change where the iteration ends.
+Each step solves the linear problem with the set-up eliminated (`ncfix.measure.least_squares`) and adds the change. The
+residual is always that of the exact, composed machine, so the iteration converges to the exact model. The Jacobian is
+that at the first guess in all steps, so the undetermined coefficients are always the same; its small error does not
+affect the result.
 """
 
 from __future__ import annotations
@@ -29,38 +29,38 @@ from ncfix.measure.selection import LOCATIONS, Selection
 from ncfix.values import frozen
 
 STEPS = 25
-"""Most steps of the iteration."""
+"""Largest number of steps."""
 CONVERGED = 1e-5
-"""Change of the predictions, in units of the noise, that is none."""
+"""Largest change of a prediction, in units of the noise, at convergence."""
 STEADY, CLOSE = 1e-3, 0.1
-"""Change of robust weights that is none; of predictions that will do where robust weights go on changing."""
-FAR = 1e6
-"""The same: from here on it is no iteration any more."""
+"""Largest change of a robust weight at convergence; of a prediction, accepted if the weights do not settle."""
+DIVERGED = 1e6
+"""Change of a prediction, in units of the noise, from which the iteration is said to run away."""
 TINY = 1e-300
 UNLIKELY = 0.01
-"""Probability of so large a chi-square below which the noise is taken to be larger than it is said to be."""
+"""Probability of chi-square below which the noise is assumed to be larger than stated."""
 ROUNDING = 1e-9
-"""mm of reading per mm or rad of error: a column that is nowhere larger is made of rounding errors."""
+"""A column of the design with no larger element, mm of reading per mm or rad of error, is rounding error: zero."""
 
 HOPELESS = 240.0
-"""A coefficient whose standard deviation is so many times what is much is held. What is held leads the others astray by
-what it really is, so this is beyond what can be told together (Esmaeili 2021, 84 errors by 109 probings: 200 times),
-and before single ones come out as centimetres, since only their sum is seen."""
+"""A coefficient is held if its standard deviation exceeds this many times a large error (`plausible.much`). A held
+coefficient biases the others by its true value, so the limit is above what is determined jointly in practice (Esmaeili
+2021, 84 errors by 109 probings: 200 times), and below the centimetres of coefficients of which only the sum is seen."""
 WIDE = 0.05
-"""rad, and the same times the reach of the machine (of a metre at least): what is known to no better than this is held
-whatever is much, as on an arm, since steps by equations that are linear in it would not end."""
+"""Upper bound of that limit: rad for angles, and times the machine's reach (at least a metre) for lengths. Larger steps
+would leave the linear range of the equations."""
 
 
 @frozen(slots=False)
 class Estimate:
-    """Where the iteration ended.
+    """The result of the iteration.
 
-    coefficients, unknowns  of the effects and of the set-up
+    coefficients, unknowns  of the effects (p,), and of the set-ups (k,), mm or rad
     solution                the last linear step
     residual                values minus predictions, (m,), mm or rad
-    weight                  (m,) 0 ... 1
-    share                   how much of the squares of normal noise the weights leave: 1 if values count in full
-    left_out                what was taken out of the model for not being significant
+    weight                  (m,) robust weights, 0 ... 1
+    share                   expected weighted mean square of normal noise of variance one; 1 without robust weights
+    left_out                insignificant coefficients that were removed from the model
     """
 
     coefficients: Array
@@ -73,16 +73,16 @@ class Estimate:
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom that are left."""
+        """Degrees of freedom of the residual."""
         return int((self.weight > 0).sum()) - self.solution.rank
 
     def chi_square(self, sigma: Array) -> float:
-        """The reduced chi-square for standard deviations (m,): 1 if the residuals are as large as the noise."""
+        """Reduced chi-square for standard deviations `sigma` (m,): 1 if the residuals are as large as the noise."""
         squares = self.weight * (self.residual / sigma) ** 2
         return float(squares.sum() / (self.share * max(self.freedom, 1)))
 
     def covariance(self, scale: float) -> Array:
-        """Of all coefficients for a noise `scale` times as large as it is said to be, (p, p); NaN where held."""
+        """Covariance of all coefficients, (p, p), for a noise `scale` times the stated one; NaN if held."""
         full, kept = np.full((len(self.coefficients), len(self.coefficients)), np.nan), self.solution.kept
         own = self.solution.covariance
         if self.left_out is not None:
@@ -94,11 +94,11 @@ class Estimate:
 
 @frozen(slots=False)
 class LeftOut:
-    """Coefficients that were left out of a model as if they were zero, which nobody knows for certain.
+    """Insignificant coefficients that were removed from a model; they are not known to be exactly zero.
 
-    selection   with them
-    stays       (q,) which of its coefficients the model has
-    covariance  (q, q) of all about what the model says of them, for a noise of one; zero where held
+    selection   the selection before the removal, of q coefficients
+    stays       (q,) mask of the coefficients that the model keeps
+    covariance  (q, q) covariance of all q about the model's values, for a noise of one; zero if held
     """
 
     selection: Selection
@@ -108,7 +108,11 @@ class LeftOut:
 
 @frozen(slots=False)
 class Problem:
-    """Several observations of one machine, stacked."""
+    """Several observations of one machine, stacked.
+
+    values  (m,) readings, mm or rad; sigma (m,): their standard deviations
+    design  (m, p) derivatives of the predictions by the estimated coefficients
+    """
 
     machine: Machine
     selection: Selection
@@ -119,7 +123,7 @@ class Problem:
 
     @staticmethod
     def of(measurements: Sequence[Measurement], machine: Machine, selection: Selection) -> Problem:
-        """Stack what the instruments saw."""
+        """Stack the observations of several measurements."""
         seen = tuple(observe(measurement, machine) for measurement in measurements)
         values = np.concatenate([each.values for each in seen])
         sigma = np.concatenate([each.sigma for each in seen])
@@ -129,26 +133,23 @@ class Problem:
 
     @cached_property
     def sizes(self) -> tuple[int, ...]:
-        """How many numbers are unknown about each set-up."""
+        """Number of unknowns of each observation."""
         return tuple(len(each.unknowns.start) for each in self.observations)
 
     @cached_property
     def stated(self) -> Mask:
-        """Which values were stated by a certificate and not read, (m,): calibrated distances."""
+        """Mask (m,) of the calibrated distances, which a certificate states."""
         rows: Ints = np.concatenate([each.rows for each in self.observations])
         return rows < 0
 
     @cached_property
     def um(self) -> Array:
-        """What each value is multiplied with to be in um, (m,); an angle counts as what it moves at half the reach."""
+        """Factor of each value to um, (m,); an angle counts as the displacement at half the machine's reach."""
         return np.concatenate([each.um for each in self.observations])
 
     @cached_property
     def limits(self) -> Array:
-        """`HOPELESS` times what is much for each coefficient, (p,), mm or rad: who knows no better knows nothing.
-
-        No more than `WIDE`.
-        """
+        """Standard deviation above which each coefficient is held, (p,), mm or rad; see `HOPELESS` and `WIDE`."""
         parts, far = [np.zeros(0)], WIDE * max(reach(self.machine), METRE)
         for effect in self.selection.estimated:
             largest = np.abs(functions(self.machine, effect)).max(axis=1)
@@ -158,23 +159,23 @@ class Problem:
 
     @cached_property
     def fleeting(self) -> Mask:
-        """Which coefficients are of effects that follow a temperature, a load, the time, ..., (p,)."""
+        """Mask (p,) of the coefficients of effects that depend on a temperature, a load, the time, ..."""
         follows = [bool(_followed(self.machine, effect)) for effect in self.selection.estimated]
         return np.repeat(np.array(follows, dtype=np.bool_), [each.basis.size for each in self.selection.estimated])
 
     @property
     def start(self) -> Array:
-        """The first guess of what is unknown about the set-ups, one after another, (k,), mm or rad."""
+        """First guess of the unknowns of all set-ups, (k,), mm or rad."""
         return np.concatenate([np.zeros(0), *(each.unknowns.start for each in self.observations)])
 
     @property
     def noise_known(self) -> bool:
-        """Whether all instruments' noise is known."""
+        """Whether the noise of all instruments is known."""
         return all(each.noise_known for each in self.observations)
 
     @cached_property
     def columns(self) -> Array:
-        """What coefficients and set-ups do to the values, in units of the noise, at the first guess: (m, p + k)."""
+        """Derivatives by coefficients and unknowns at the first guess, in units of the noise, (m, p + k)."""
         return np.concatenate([self.design, self.nuisance(self.start)], axis=1) / self.sigma[:, None]
 
     def residual(self, coefficients: Array, unknowns: Array) -> Array:
@@ -185,7 +186,7 @@ class Problem:
         return self.values - np.concatenate(predicted)
 
     def nuisance(self, unknowns: Array) -> Array:
-        """The derivative of predictions by the unknowns at `unknowns` (k,): (m, k), a block for each observation."""
+        """Derivatives (m, k) of the predictions by the unknowns, at `unknowns` (k,); block diagonal by observation."""
         columns = np.zeros((len(self.values), sum(self.sizes)))
         parts = np.split(unknowns, np.cumsum(self.sizes)[:-1])
         row = column = 0
@@ -198,15 +199,15 @@ class Problem:
 
 @frozen(eq=False, slots=False)
 class Calibration:
-    """A calibrated machine and how well it is known.
+    """A calibrated machine and its uncertainty.
 
-    machine     with the estimated coefficients and their covariances
-    problem     what was solved
-    estimate    where it ended
+    machine     the machine with estimated coefficients and their covariances
+    problem     the least-squares problem
+    estimate    its solution
     scale       factor on the standard deviations: 1 if the noise was known and explains the residuals
-    remarks     what the user should know: what could not be told, outliers, noise
-    before_um   rms of the lengths about the machine as it was, set-up fitted; after_um the same about the result; NaN
-                if only angles were measured
+    remarks     remarks for the user: undetermined coefficients, outliers, noise
+    before_um   rms residual of lengths with the given machine, set-up fitted, um; after_um: with the result; NaN if only
+                angles were measured
     """
 
     machine: Machine
@@ -229,23 +230,23 @@ class Calibration:
 
     @property
     def covariance(self) -> Array:
-        """Of all coefficients, (p, p); NaN where they were held."""
+        """Covariance of all coefficients, (p, p); NaN if held."""
         return self.estimate.covariance(self.scale)
 
     @property
     def sigma(self) -> Array:
-        """The standard deviations of all coefficients, (p,); NaN where they were held."""
+        """Standard deviations of all coefficients, (p,); NaN if held."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def asked(self) -> Selection:
-        """What was asked for, with what was left out since."""
+        """The selection that was asked for, including coefficients that were removed since."""
         return self.problem.selection if self.estimate.left_out is None else self.estimate.left_out.selection
 
     def uncertainty(self, design: Array) -> Array:
-        """Standard deviation of a prediction with this design over the coefficients asked for, (..., p) -> (...).
+        """Standard deviation (...) of a prediction with design (..., p) over the coefficients of `asked`.
 
-        `machine.design(q, state, asked.estimated)` gives that of the pose error. What was held counts as known.
+        `machine.design(q, state, asked.estimated)` is the design of the pose error. Held coefficients count as known.
         """
         left_out = self.estimate.left_out
         covariance = np.nan_to_num(self.covariance) if left_out is None else left_out.covariance * self.scale**2
@@ -257,7 +258,7 @@ def _followed(machine: Machine, effect: Effect) -> frozenset[str]:
 
 
 def fit(problem: Problem, loss: str = least_squares.AUTO) -> Estimate:
-    """Iterate to convergence; with `auto` once more without the outliers that a robust look finds.
+    """Iterate to convergence; with loss `auto` repeat without the outliers that a robust fit finds.
 
     Raises `UsageError` NCF630 and NCF637.
     """
@@ -283,7 +284,7 @@ def fit(problem: Problem, loss: str = least_squares.AUTO) -> Estimate:
 
 
 def _enough(problem: Problem) -> None:
-    """Refuse if nothing would be left to tell noise from error."""
+    """Refuse a problem without degrees of freedom: NCF630."""
     m, p = len(problem.values), int((np.abs(problem.design) > 0).any(axis=0).sum())
     nuisance = problem.nuisance(problem.start)
     k = int(np.linalg.matrix_rank(nuisance)) if nuisance.shape[1] else 0
@@ -294,7 +295,7 @@ def _enough(problem: Problem) -> None:
 
 
 def _first_scale(problem: Problem) -> float:
-    """How many times larger than it is taken to be an unknown noise is, by what the first linear step leaves."""
+    """Factor on an unknown noise, estimated by the residual of the first linear step."""
     design, nuisance = np.split(problem.columns, [problem.design.shape[1]], axis=1)
     target = problem.residual(problem.selection.start, problem.start) / problem.sigma
     solution = solve(design, nuisance, target, problem.limits, problem.fleeting)
@@ -302,7 +303,7 @@ def _first_scale(problem: Problem) -> float:
 
 
 def _iterate(problem: Problem, weight: Array, loss: str, scale: float = 1.0) -> Estimate:
-    """Gauss-Newton steps to convergence; `scale`: the noise is this many times larger than it is said to be."""
+    """Gauss-Newton steps to convergence; `scale`: factor on the stated noise. Raises `UsageError` NCF637."""
     design = problem.design / problem.sigma[:, None]
     nuisance = problem.nuisance(problem.start) / problem.sigma[:, None]
     robust = loss in (least_squares.HUBER, least_squares.TUKEY)
@@ -330,7 +331,7 @@ def _iterate(problem: Problem, weight: Array, loss: str, scale: float = 1.0) -> 
     (coefficients, unknowns, weight), size = gauss_newton(step, start, STEPS, CONVERGED)
     if not size < CONVERGED and not (robust and np.abs(change).max() < CLOSE):
         size = float(np.abs(change).max())
-        still = f"still change by {size:.3g} times the noise" if size < FAR else "run away"
+        still = f"still change by {size:.3g} times the noise" if size < DIVERGED else "run away"
         text = f"after {STEPS} steps the predictions {still}"
         raise UsageError.of("NCF637", text, hint="are the measurements of this machine, in mm and degree?")
     residual = problem.residual(coefficients, unknowns)
@@ -346,14 +347,14 @@ def noise_scale(problem: Problem, estimate: Estimate) -> float:
 
 @frozen(slots=False)
 class Residuals:
-    """One entry per value, (m,).
+    """Residuals of a calibration; arrays with one entry per value, (m,).
 
-    measurements  those that were calibrated with
-    observation   which of them, row of it (-1: a calibrated distance), and component
-    turns         whether it is an angle
-    value         mm or rad, actual minus predicted
-    studentised   divided by its own standard deviation
-    cook          Cook's distance: how far all estimates move if this value is left out
+    measurements  the measurements of the calibration
+    observation   index of the measurement; row: of it (-1: a calibrated distance); component: name of the value
+    turns         whether the value is an angle
+    value         measured minus predicted, mm or rad
+    studentised   residual divided by its own standard deviation
+    cook          Cook's distance: change of all estimates if this value is left out
     """
 
     measurements: tuple[Measurement, ...]
@@ -367,7 +368,7 @@ class Residuals:
 
     @staticmethod
     def of(problem: Problem, estimate: Estimate) -> Residuals:
-        """The residuals with their diagnostics; those without weight are studentised as new values would be."""
+        """The residuals with their diagnostics; outliers (weight 0) are studentised like new values."""
         solution, weight = estimate.solution, estimate.weight
         size = estimate.residual / problem.sigma
         scale = np.sqrt(estimate.chi_square(problem.sigma)) or 1.0
@@ -388,12 +389,12 @@ class Residuals:
         )
 
     def place(self, index: int) -> Place:
-        """Where a value stands in its file."""
+        """The place of a value in its file."""
         measurement, row = self.measurements[int(self.observation[index])], int(self.row[index])
         return Place(measurement.path) if row < 0 else measurement.place(row)
 
     def rms_by_set(self) -> dict[str, float]:
-        """The rms of lengths in um, per file and set."""
+        """Root mean square of the length residuals of each file and set, um."""
         sizes: dict[str, float] = {}
         for index, measurement in enumerate(self.measurements):
             mine = np.flatnonzero((self.observation == index) & (self.row >= 0) & ~self.turns)

@@ -1,8 +1,7 @@
-"""From a measurement to its instrument's view of a machine, and back: what an instrument would read there.
+"""The observation model of each kind of measurement, and simulated measurements.
 
-`observe` gives the observation model of a measurement. `simulate` makes measurements that never were, with noise and
-the faults of measuring, by the same observation models as for calibration, so what they cannot see is not in the data
-either; the set-up is drawn at random and nobody is told.
+`observe` returns the observation model of a measurement. `simulate` fills in a plan with noise, drift and a random,
+unknown set-up. It uses the same observation models as calibration, so the data contain only what instruments see.
 """
 
 from __future__ import annotations
@@ -22,15 +21,15 @@ from ncfix.measure.tracker import Targets
 from ncfix.values import frozen
 
 UNKNOWNS = 6
-"""Of a set, at most: a shift and a turn."""
-MOST = 60_000_000
-"""Numbers in the matrix of what is unknown: half a gigabyte, of which some copies are needed."""
+"""Largest number of unknowns of a set: a shift and a rotation."""
+MAX_ELEMENTS = 60_000_000
+"""Largest number of elements of the design of the unknowns: half a gigabyte, of which some copies are needed."""
 FEW_SETS = 100
-"""Sets that are never too many."""
+"""Number of sets that is always allowed."""
 ROUNDS = 50
-"""Most iterations to find them."""
+"""Largest number of iterations to find readings that are axis positions."""
 SETTLED = 1e-9
-"""mm: readings that change by less are found."""
+"""Largest change of a reading, mm, at which the iteration ends."""
 
 VIEWS: dict[str, type[Observation]] = {
     "tcp": TipErrors,
@@ -42,16 +41,16 @@ VIEWS: dict[str, type[Observation]] = {
 
 
 def observe(measurement: Measurement, machine: Machine) -> Observation:
-    """The observation model of this measurement's kind, for this machine's chain.
+    """The observation model of this measurement's kind, for this machine.
 
-    Raises `UsageError` NCF624 if it has so many set-ups that what is unknown about them cannot be worked out.
+    Raises `UsageError` NCF624 if it has too many set-ups to solve for.
     """
     labels = measurement.labels
     names = [len(set(labels[name])) for name in ("ball", "target") if name in labels]
     zeros = [labels["component"]] if measurement.kind == "axis" else []
     sets = len(set(zip(measurement.sets, *zeros, strict=True)))
     values, unknowns = 3 * len(measurement), UNKNOWNS * sets + 3 * sum(names)
-    if values * unknowns > MOST and sets > FEW_SETS:
+    if values * unknowns > MAX_ELEMENTS and sets > FEW_SETS:
         text = f"{sets} sets of {len(measurement)} rows: some {unknowns} unknowns of set-ups, too many to work out"
         hint = "rows that were measured in one set-up have one and the same `set`"
         raise UsageError.of("NCF624", text, measurement.place(0), hint)
@@ -62,13 +61,14 @@ def observe(measurement: Measurement, machine: Machine) -> Observation:
 
 @frozen
 class Faults:
-    """How a measurement goes wrong.
+    """Disturbances of a simulated measurement.
 
-    noise_um        standard deviation of a length; noise_urad that of an angle, None: that of a length at 100 mm
-    drift_um        a straight drift of lengths over the whole measurement (by `time_s`, else by row), per component at
-                    random between minus and plus this
-    quantum_um      step of the instrument's display, 0 for none
-    setup           how far the set-up is off, 1 for what is usual for the instrument, 0 for not at all
+    noise_um        standard deviation of a length, um
+    noise_urad      standard deviation of an angle, urad; None: that of a length at 100 mm
+    drift_um        largest linear drift of a length over the measurement (by `time_s`, else by row), um; the drift of
+                    each component is random between minus and plus this
+    quantum_um      step of the instrument's display, um; 0: none
+    setup           size of the unknown set-up: 1 as usual for the instrument, 0 none
 
     Raises `UsageError` NCF025.
     """
@@ -86,9 +86,9 @@ class Faults:
 
 
 def simulate(plan: Measurement, machine: Machine, faults: Faults | None = None, seed: int = 0) -> Measurement:
-    """The plan filled in as this machine would have it, shape as the plan; the same seed gives the same values.
+    """The plan with simulated readings of this machine; equal seeds give equal values.
 
-    Raises `UsageError` NCF025 for a seed that is none.
+    Raises `UsageError` NCF025 for an invalid seed.
     """
     SEED.check("seed", seed)
     faults = Faults() if faults is None else faults
@@ -116,7 +116,7 @@ def simulate(plan: Measurement, machine: Machine, faults: Faults | None = None, 
 
 
 def _started(plan: Measurement) -> Measurement:
-    """The plan without values that would be taken for measured ones; probing keeps where it is meant to probe."""
+    """The plan without measured values; kind probe keeps the positions at which it is to probe."""
     if plan.kind in ("probe", "tcp", "tcp6"):
         return plan
     columns = {name: values for name, values in plan.columns.items() if name not in plan.measured}
@@ -124,7 +124,7 @@ def _started(plan: Measurement) -> Measurement:
 
 
 def _settled(plan: Measurement, machine: Machine, setup: Array) -> tuple[Measurement, Observation]:
-    """The plan with exact values; axis positions that are themselves the reading are found by iteration."""
+    """The plan and its model; for kind probe, whose readings are axis positions, with exact ones found by iteration."""
     plan = _started(plan)
     model = observe(plan, machine)
     if plan.kind != "probe":
@@ -140,7 +140,7 @@ def _settled(plan: Measurement, machine: Machine, setup: Array) -> tuple[Measure
 
 
 def _drift(plan: Measurement, model: Observation, faults: Faults, random: np.random.Generator) -> Array:
-    """What a length in each value drifts, (m,)."""
+    """Drift of each value if it is a length, (m,) mm."""
     time = plan.columns.get("time_s", np.arange(len(plan), dtype=np.float64))
     share = (time - time.min()) / (float(np.ptp(time)) or 1.0)
     ways = random.uniform(-1.0, 1.0, len(model.components)) * faults.drift_um * 1e-3

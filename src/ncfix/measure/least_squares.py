@@ -1,8 +1,8 @@
-"""Least squares: Gauss-Newton steps, the linear problem of each, which unknowns can be told, and robust weights.
+"""Least squares: Gauss-Newton steps, linear problems with undetermined coefficients, and robust weights.
 
-In linear problems unknowns of no interest are eliminated. Everything is in units of the noise: rows were divided by
-their standard deviations before. Robust weights are those of Holland and Welsch, "Robust regression using iteratively
-reweighted least-squares" (1977).
+In linear problems nuisance unknowns (the set-up) are eliminated. All rows are in units of the noise, divided by their
+standard deviations. Robust weights are those of Holland and Welsch, "Robust regression using iteratively reweighted
+least-squares" (1977).
 """
 
 from __future__ import annotations
@@ -19,35 +19,37 @@ from ncfix.arrays import Array, Ints, Mask
 from ncfix.values import frozen
 
 NUISANCE_RANK = 1e-10
-"""Singular values of the scaled nuisance columns below this are zero."""
+"""Relative singular value of the scaled nuisance columns below which it counts as zero."""
 VISIBLE = 1e-6
-"""A column of which less than this is left after the set-up was eliminated is not seen."""
+"""A column of which a smaller share is left after eliminating the set-up is not seen."""
 RANK = 1e-6
-"""Scaled columns nearer than this to a combination of others are that combination."""
+"""A scaled column nearer than this to a combination of others counts as that combination."""
 STURDY = 0.05
-"""Of columns that are combinations of one another the first are kept, if this much of them is new."""
+"""Share of a scaled column, orthogonal to those before it, from which it is kept in the given order."""
 ALONE = 0.3
-"""Share of a held column that is new from which on it is no combination of others, but weak by itself."""
+"""Share of a held column orthogonal to the kept ones from which it is called weak, not a combination of them."""
 SIGNIFICANT = 0.02
-"""Share from which on a column is named as part of such a combination."""
+"""Share, of the largest factor, from which a column is named as part of a combination."""
 AUTO, NONE, HUBER, TUKEY = "auto", "none", "huber", "tukey"
 HUBER_K, TUKEY_K = 1.345, 4.685
-"""The usual constants: 95 % efficiency for normal noise."""
+"""Tuning constants for 95 % efficiency with normal noise."""
 ROUNDS = 30
+"""Largest number of iterations of the robust fit."""
 FALSE_ALARM = 0.001
-"""How often one value of a clean measurement may be taken for an outlier."""
+"""Probability of any false outlier in a clean measurement."""
 HEAVY = 1.6
-"""Noise has longer tails than the normal distribution: how much further out a value may be."""
+"""Factor on the normal limit of outliers, since real noise has longer tails."""
 ROUNDING, TINY = 1e-12, 1e-300
 
 At = TypeVar("At")
 
 
 def gauss_newton(step: Callable[[At], tuple[At, float]], start: At, most: int, settled: float) -> tuple[At, float]:
-    """Steps from a first guess until the predictions no longer change; where they end, and how far the last one went.
+    """Iterate `step` from a first guess until the predictions settle; returns the end and the size of the last step.
 
-    step     from a guess to the next one, by linear least squares about it, and the largest change of a prediction
-    most     so many steps; if the last one changes a prediction by `settled` or more, they did not converge
+    step     maps a guess to the next one and the largest change of a prediction
+    most     largest number of steps
+    settled  the iteration ends when the change is below this; if the last step was larger, it did not converge
     """
     at, size = start, np.inf
     for _ in range(most):
@@ -68,19 +70,19 @@ class Combination:
 
 @frozen(slots=False)
 class Solution:
-    """What least squares say of p coefficients.
+    """Least-squares solution for p coefficients, of which undetermined ones are held.
 
-    change       (p,) what is to be added; zero for those held
-    kept         (r,) indices of those that were estimated
-    unseen       those that change nothing that was measured
-    set_up       those that change only what the unknown set-up changes too
-    combinations those that are held because others do the same
-    weak         those that are held because they are seen too little to be told from zero
-    covariance   (r, r) of the kept, for a noise of one
-    orthogonal   (m, r) orthonormal columns of the kept after elimination
-    nuisance     (m, s) orthonormal columns of the set-up
-    residual     (m,) what is left
-    condition    of the kept columns, scaled to one
+    change       (p,) change of the coefficients; zero if held
+    kept         (r,) indices of the estimated coefficients
+    unseen       held: they do not affect the measured values
+    set_up       held: they only affect the values as the unknown set-up does
+    combinations held: a combination of others has the same effect
+    weak         held: their effect is too small to determine them
+    covariance   (r, r) of the estimated ones, for a noise of one
+    orthogonal   (m, r) orthonormal basis of their columns after elimination of the set-up
+    nuisance     (m, s) orthonormal basis of the columns of the set-up
+    residual     (m,) in units of the noise
+    condition    condition number of the estimated columns, scaled to unit length
     """
 
     change: Array
@@ -97,17 +99,17 @@ class Solution:
 
     @property
     def leverage(self) -> Array:
-        """How much each value determines its own prediction, (m,)."""
+        """Leverage of each value on its own prediction, (m,)."""
         return (self.orthogonal**2).sum(1) + (self.nuisance**2).sum(1)
 
     @property
     def rank(self) -> int:
-        """How many numbers were determined, set-up included."""
+        """Number of determined parameters, including the set-up."""
         return int(self.orthogonal.shape[1] + self.nuisance.shape[1])
 
 
 def orthonormal(columns: Array) -> Array:
-    """An orthonormal basis of what the columns span, (m, k) -> (m, rank)."""
+    """An orthonormal basis (m, rank) of the span of columns (m, k)."""
     size = np.linalg.norm(columns, axis=0)
     scaled = columns[:, size > 0] / size[size > 0]
     if not scaled.shape[1]:
@@ -117,9 +119,9 @@ def orthonormal(columns: Array) -> Array:
 
 
 def inverse(matrix: Array) -> Array:
-    """The inverse of a symmetric positive definite matrix (n, n), in its place, by its Cholesky factor.
+    """The inverse of a symmetric positive definite matrix (n, n), computed in place by its Cholesky factor.
 
-    Raises `numpy.linalg.LinAlgError` where it is none.
+    Raises `numpy.linalg.LinAlgError` if it is not positive definite.
     """
     factor, failed = dpotrf(matrix.T, lower=1, overwrite_a=1)
     if failed:
@@ -131,7 +133,7 @@ def inverse(matrix: Array) -> Array:
 
 
 def without(basis: Array, columns: Array) -> Array:
-    """The part of columns (m, ...) orthogonal to an orthonormal basis (m, k); done twice, for the last digits."""
+    """The part of columns (m, ...) orthogonal to an orthonormal basis (m, k); projected twice against rounding."""
     once = columns - basis @ (basis.T @ columns)
     return once - basis @ (basis.T @ once)
 
@@ -139,10 +141,11 @@ def without(basis: Array, columns: Array) -> Array:
 def solve(
     design: Array, nuisance: Array, target: Array, limit: Array | None = None, last: Mask | None = None
 ) -> Solution:
-    """Least squares of `design @ change + nuisance @ anything = target`.
+    """Least squares of `design @ change + nuisance @ anything = target`, all rows in units of the noise.
 
-    design (m, p), nuisance (m, k), target (m,), all divided by the noise; limit (p,): what would be known to no better
-    than this is not known, and held; last (p,): of columns that do the same, these are held before others.
+    design (m, p), nuisance (m, k), target (m,)
+    limit  (p,) coefficients with a larger standard deviation are held
+    last   (p,) mask: among columns of the same effect, these are held before others
     """
     basis = orthonormal(nuisance)
     left, wanted = without(basis, design), without(basis, target)
@@ -176,10 +179,11 @@ def solve(
 def _independent(
     scaled: Array, seen: Ints, size: Array, most: Array, order: Ints
 ) -> tuple[Ints, Array, Array, tuple[Combination, ...], tuple[int, ...]]:
-    """A largest set of independent columns, their QR factors, what the others are made of, and which are just weak.
+    """A largest set of independent columns and their QR factors; of the others, combinations and weak ones.
 
-    most (s,) is the standard deviation of the scaled columns' factors beyond which one is not known; order (s,): which
-    are kept first.
+    scaled (m, s)  columns of unit length; seen (s,): their indices among all; size (s,): their lengths before scaling
+    most (s,)      limits of the standard deviations of the scaled coefficients
+    order (s,)     the order in which columns are kept
     """
     if not scaled.shape[1]:
         return np.zeros(0, dtype=np.int64), scaled, np.zeros((0, 0)), (), ()
@@ -201,10 +205,10 @@ def _independent(
 
 
 def _known(scaled: Array, chosen: Ints, most: Array) -> tuple[Ints, Array, Array]:
-    """The chosen columns whose factors are known to `most` (s,), and their QR factors.
+    """The chosen columns whose coefficients have standard deviations within `most` (s,), and their QR factors.
 
-    The one that is known least is left out, and all others are looked at anew: of columns whose sum alone is seen, one
-    goes and the others are known.
+    The least determined one is dropped and the others are checked again: if only the sum of some columns is seen,
+    dropping one determines the others.
     """
     orthogonal, upper = np.linalg.qr(scaled[:, chosen])
     among, triangle = np.arange(len(chosen)), upper
@@ -221,7 +225,9 @@ def _known(scaled: Array, chosen: Ints, most: Array) -> tuple[Ints, Array, Array
 
 
 def _chosen(scaled: Array, order: Ints) -> Ints:
-    """Which columns are kept: the first that are well apart, so that noise does not decide, then what is left by QR."""
+    """Indices of independent columns: first those clearly independent of earlier ones in `order`, so that noise does
+    not decide; then further ones by pivoted QR.
+    """
     first: list[int] = []
     basis: Array = np.zeros((len(scaled), 0))
     for k in order.tolist():
@@ -243,12 +249,12 @@ def _chosen(scaled: Array, order: Ints) -> Ints:
 
 
 def robust_spread(residual: Array) -> float:
-    """A robust standard deviation of residuals (m,): their median size over that of the normal distribution."""
+    """A robust standard deviation of residuals (m,): their median absolute value over that of the unit normal."""
     return float(np.median(np.abs(residual))) / 0.6745 or 1.0
 
 
 def robust_weights(loss: str, residual: Array) -> Array:
-    """The weights (m,), 0 to 1, of iteratively reweighted least squares for residuals (m,); of Tukey unless Huber's."""
+    """The weights (m,), 0 to 1, of iteratively reweighted least squares for residuals (m,), by Huber or else Tukey."""
     size = np.abs(residual) / robust_spread(residual)
     if loss == HUBER:
         return np.minimum(1.0, HUBER_K / np.maximum(size, 1e-12))
@@ -256,7 +262,7 @@ def robust_weights(loss: str, residual: Array) -> Array:
 
 
 def weighted_share(loss: str) -> float:
-    """The mean of weight times square over normal noise of one: residuals so weighted look smaller than the noise is.
+    """Expected weight times square for unit normal noise, below 1 for robust losses: a correction of chi-square.
 
     Moments of the normal distribution within a bound are chi-square probabilities.
     """
@@ -269,10 +275,9 @@ def weighted_share(loss: str) -> float:
 
 
 def outliers(solution: Solution) -> Mask:
-    """Which values lie further from a robust fit than noise can explain, (m,).
+    """Mask (m,) of the values further from a robust fit than noise explains.
 
-    The fit is that of the linear problem round the least-squares solution, whose columns are at hand; Huber's weights
-    let no value pull for more than its share.
+    The fit is a Huber fit of the linear problem about the least-squares solution.
     """
     columns = np.concatenate([solution.orthogonal, solution.nuisance], axis=1)
     residual = solution.residual
@@ -292,11 +297,12 @@ def outliers(solution: Solution) -> Mask:
 
 
 def _confirmed(suspected: Mask, size: Array, columns: Array, residual: Array) -> Mask:
-    """The suspected values (m,) that least squares of all others do not predict; the rest is no longer suspected.
+    """Mask (m,) of the suspected values that deviate significantly from their prediction by all other values.
 
-    With few values for the unknowns a robust fit follows some of them and leaves the others out in the cold; the t
-    distribution of what the others predict allows for how little they know. Residuals are those of least squares, of
-    sizes (m,) about the robust fit; columns are orthonormal.
+    With few degrees of freedom a robust fit follows some values and rejects others without reason; the t distribution
+    of the prediction error allows for this.
+    size      (m,) deviations from the robust fit, in robust standard deviations
+    columns   (m, r) orthonormal; residual (m,): of least squares
     """
     gross = suspected.copy()
     while gross.any():
