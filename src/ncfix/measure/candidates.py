@@ -1,7 +1,7 @@
-"""Poses from which a plan chooses: spread over the travels without a common step, and their ends.
+"""Candidate poses of a measurement plan: spread over the travels, without a common step, and near the ends.
 
-Positions come from Halton's sequence with the digits of every place shuffled (Owen 2017), so no axis is sampled at even
-distances: an error that repeats with a screw's pitch cannot hide (Soons, section 2.3).
+Positions are a Halton sequence with shuffled digits (Owen 2017). No axis is sampled at equal distances, so an error
+periodic with the pitch of a screw cannot be missed (Soons, section 2.3).
 """
 
 from __future__ import annotations
@@ -21,40 +21,40 @@ from ncfix.values import frozen
 
 DECIMALS = 3
 CORNERS = 0.4
-"""Share of candidates of which each axis stands near one of its ends or the middle."""
-NEAR = 0.03
-"""How near, as a share of the travel: not at the same place each time, or the places would have a common step."""
+"""Share of candidates with every axis near an end or the middle of its travel."""
+CORNER_WIDTH = 0.03
+"""Largest distance from that end or middle, as a share of the travel; random, to avoid a common step."""
 APPROACH = {"linear": 2.0, "rotary": 1.0}
-"""mm and degree: how far an axis goes back before it comes from the wanted side."""
+"""Distance, mm and degree, from which an axis approaches a position from the wanted side."""
 TRIES = 20
-"""How often more poses are drawn where few of them are within reach."""
+"""Number of draws if few poses are within reach."""
 BALLS = 4
-"""Of an R-test, sets with a ball each, if there are poses enough."""
+"""Largest number of balls of an R-test; each is a set."""
 FEW = 10
-"""Poses that a ball is worth."""
+"""Smallest number of poses of a plan for each ball."""
 CHOICE = 3
-"""Candidates for each pose of a plan, at least."""
+"""Smallest number of candidates for each pose of a plan."""
 LOOKED_AT = 120
-"""Places at which a ball might stand, and positions of the rotary axes at which it is seen whether it is reached."""
+"""Number of places that are tried for a ball, and of rotary positions at which each is tried."""
 APART = 60.0
-"""mm: between balls."""
+"""Smallest distance between balls, mm."""
 ROUNDING = 1e-9
-"""mm or degree: no way beyond the travel."""
+"""Tolerance of a travel limit, mm or degree."""
 UNLIMITED_MM = 100.0
-"""Half the travel that is taken for a linear axis without a range."""
+"""Half the assumed travel of a linear axis without a range, mm."""
 FINEST = 2.0**-54
-"""Digits count down to this: below it a number next to one cannot be told from one."""
+"""Smallest digit of a Halton number: half an ulp below one."""
 
 
 @frozen(slots=False)
 class Room:
-    """Where measuring is possible.
+    """The space and the tools with which can be measured.
 
-    ranges        axis -> (low, high) mm or degree; those of the machine where not given
-    tool_lengths  mm, the tools that there are
-    balls         ball -> place in the workpiece frame, mm (kind probe)
-    reach         x, y or z -> (low, high) mm between which the tip stays, workpiece frame
-    inputs        state column, such as load_kg -> (low, high) between which it can be set
+    ranges        axis -> (low, high), mm or degree; default: the travel of the machine
+    tool_lengths  lengths of the available tools, mm
+    balls         ball -> position in the workpiece frame, mm (kind probe)
+    reach         x, y or z -> (low, high) limits of the tool tip in the workpiece frame, mm
+    inputs        state column such as load_kg -> (low, high) between which it can be set
     """
 
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -64,7 +64,7 @@ class Room:
     inputs: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def of(self, axis: Axis) -> tuple[float, float]:
-        """The range of an axis, mm or degree."""
+        """The usable range of an axis, mm or degree."""
         if axis.name in self.ranges:
             return self.ranges[axis.name]
         low, high = (limit / axis.unit for limit in axis.range)
@@ -73,14 +73,14 @@ class Room:
         return (0.0, 360.0) if axis.rotary else (-UNLIMITED_MM, UNLIMITED_MM)
 
     def check(self, machine: Machine) -> None:
-        """Refuse what this machine cannot measure in: `UsageError` NCF636, or NCF025 for a length that no tool has."""
+        """Refuse a space that is impossible on this machine: `UsageError` NCF636, or NCF025 for a tool length."""
         for text, hint in self._faults(machine):
             raise UsageError.of("NCF636", text, hint=hint)
         for length in self.tool_lengths:
             TOOL_LENGTH.check("tool_length", length)
 
     def _faults(self, machine: Machine) -> Iterator[tuple[str, str]]:
-        """What is the matter, with what to do about it."""
+        """Faults as (text, hint)."""
         if faults := list(self._miscounted()):
             yield from faults
             return
@@ -105,7 +105,7 @@ class Room:
             yield "there is no tool to measure with", "--tool-length MM"
 
     def _miscounted(self) -> Iterator[tuple[str, str]]:
-        """Ranges that are not two numbers, and balls without three coordinates."""
+        """Faults of ranges that are not two numbers, and of balls without three coordinates."""
         for option, given in (("--range", self.ranges), ("--reach", self.reach), ("--input", self.inputs)):
             for name, limits in given.items():
                 if len(limits) != 2:
@@ -116,13 +116,13 @@ class Room:
 
 
 def offered(machine: Machine, kind: str, count: int, room: Room, seed: int = 0) -> Measurement:
-    """Poses of this kind, for `tcp` those of an R-test where the machine can run one. Raises `UsageError` NCF636."""
+    """Candidate poses; for kind `tcp` of an R-test if the machine can run one. Raises `UsageError` NCF636."""
     ball = kind == "tcp" and has_r_test(machine)
     return r_test(machine, count, room, seed) if ball else candidates(machine, kind, count, room, seed)
 
 
 def candidates(machine: Machine, kind: str, count: int, room: Room, seed: int = 0) -> Measurement:
-    """A plan of so many poses of this kind; fewer where probing cannot reach. Raises `UsageError` NCF636."""
+    """`count` random poses of a kind; fewer if probing cannot reach all balls. Raises `UsageError` NCF636."""
     if kind not in PLANS:
         raise UsageError.of("NCF636", f"there are no plans of kind {kind!r}", hint="tcp, tcp6, probe or length")
     random = np.random.default_rng(seed)
@@ -135,7 +135,7 @@ def candidates(machine: Machine, kind: str, count: int, room: Room, seed: int = 
 
 
 def _within_reach(machine: Machine, kind: str, count: int, room: Room, random: np.random.Generator) -> dict[str, Array]:
-    """Columns of poses whose tip stays where it may; of probed balls the balls say where the tip is."""
+    """Columns of poses with the tip within `room.reach` (not for kind probe, whose balls determine the tip)."""
     found = _drawn(machine, count, room, random)
     if not room.reach or kind == "probe":
         return found
@@ -158,7 +158,7 @@ def _poses(machine: Machine, columns: Mapping[str, Array]) -> Array:
 
 
 def _drawn(machine: Machine, count: int, room: Room, random: np.random.Generator) -> dict[str, Array]:
-    """Positions all over the ranges, sides, tools and what else can be set."""
+    """Random positions over the ranges, directions of approach, tools and inputs."""
     columns = {}
     for axis, share in zip(machine.axes, _spread(len(machine.axes), count, random).T, strict=True):
         low, high = room.of(axis)
@@ -172,14 +172,14 @@ def _drawn(machine: Machine, count: int, room: Room, random: np.random.Generator
 
 
 def _sides(axis: Axis, position: Array, wanted: Array, room: Room) -> Array:
-    """From which side the axis comes: as wanted, but from the inside where there is no room beyond."""
+    """Direction of approach, 1 or -1, as wanted, except near an end of the range: from the inside there."""
     low, high = room.of(axis)
     step = APPROACH["rotary" if axis.rotary else "linear"]
     return np.where(position - low < step, -1.0, np.where(high - position < step, 1.0, wanted))
 
 
 def _inside(tip: Array, room: Room) -> Mask:
-    """Which places of the tip (n, 3) are within reach."""
+    """Mask of the tip positions (n, 3) within reach."""
     inside = np.ones(len(tip), dtype=bool)
     for name, (low, high) in room.reach.items():
         place = tip[:, "xyz".index(name)]
@@ -188,20 +188,21 @@ def _inside(tip: Array, room: Room) -> Mask:
 
 
 def _spread(axes: int, count: int, random: np.random.Generator) -> Array:
-    """Shares of the ranges, (count, axes)."""
+    """Positions as shares 0 ... 1 of the ranges, (count, axes)."""
     unit = halton(count, axes, random)
     ends = random.random(count) < CORNERS
-    near = random.choice([0.0, 0.5, 1.0], (int(ends.sum()), axes)) + NEAR * random.uniform(-1, 1, (ends.sum(), axes))
+    corners = random.choice([0.0, 0.5, 1.0], (int(ends.sum()), axes))
+    near = corners + CORNER_WIDTH * random.uniform(-1, 1, (ends.sum(), axes))
     unit[ends] = 1 - np.abs(1 - np.abs(near))
     return unit
 
 
 def r_test(machine: Machine, count: int, room: Room, seed: int = 0) -> Measurement:
-    """A plan of kind `tcp` as it is measured: a ball stands on the table, and the tip stays at it while axes turn.
+    """Poses of an R-test, kind `tcp`: a ball stands on the table, and the tip stays at it while rotary axes turn.
 
-    Every set has one ball. The rotary axes are drawn, the linear ones follow from them; what the travels do not allow
-    is drawn again. Balls stand where `room` says, or where most positions of the rotary axes reach them, with the tip
-    within its reach. Raises `UsageError` NCF636 where no ball can be reached, or one is to stand beyond the reach.
+    Every set has one ball. Rotary positions are random, the linear ones follow; poses outside the travels are drawn
+    again. Balls stand where `room` says, or where most rotary positions reach them with the tip within its limits.
+    Raises `UsageError` NCF636 if no ball can be reached, or a given ball is out of reach.
     """
     random = np.random.default_rng(seed)
     balls = room.balls or _reachable_balls(machine, room, random, max(1, min(BALLS, count // (CHOICE * FEW))))
@@ -227,14 +228,14 @@ def r_test(machine: Machine, count: int, room: Room, seed: int = 0) -> Measureme
 
 
 def has_r_test(machine: Machine) -> bool:
-    """Whether a ball tells anything: there are axes that turn about it, and X, Y and Z that follow."""
+    """Whether the machine can run an R-test: it has rotary axes, and X, Y and Z to follow the ball."""
     return bool(machine.rotary.any()) and {"X", "Y", "Z"} <= {axis.name for axis in machine.axes if not axis.rotary}
 
 
 def _moved_to(
     machine: Machine, columns: Mapping[str, Array], places: Array, room: Room
 ) -> tuple[dict[str, Array], Mask]:
-    """The columns with X, Y and Z where the tip is at the places (n, 3), and which of these the travels allow."""
+    """The columns with X, Y and Z such that the tip is at the places (n, 3); and a mask of those within the travels."""
     q = _poses(machine, columns)
     linear, moved = _towards(machine, q, columns["tool_length"], places)
     limits = np.array([room.of(machine.axes[k]) for k in linear])
@@ -249,7 +250,7 @@ def _moved_to(
 
 
 def _towards(machine: Machine, q: Array, tool_length: Array, places: Array) -> tuple[list[int], Array]:
-    """The columns of X, Y and Z, and where these bring the tip of poses q (n, n_axes) to the places (n, 3): (n, 3)."""
+    """Indices of the axes X, Y, Z, and their positions (n, 3), mm, that bring the tip of poses q to places (n, 3)."""
     linear = [list(machine.axis_names).index(axis) for axis in "XYZ"]
     by_axes = np.linalg.inv(machine.axis_jacobian(q, tool_length)[:, :3, linear])
     gap = machine.tip(q, tool_length) - places
@@ -260,7 +261,7 @@ def _towards(machine: Machine, q: Array, tool_length: Array, places: Array) -> t
 def _reachable_balls(
     machine: Machine, room: Room, random: np.random.Generator, most: int
 ) -> dict[str, tuple[float, float, float]]:
-    """Places within reach, apart from each other, that most positions of the rotary axes can bring to the tip."""
+    """Up to `most` ball positions, mm, that most rotary positions reach, at least `APART` from each other."""
     columns = _within_reach(machine, "tcp", LOOKED_AT, room, random)
     q = _poses(machine, columns)
     tips = machine.tip(q, columns["tool_length"])
@@ -279,7 +280,7 @@ def _reachable_balls(
 
 
 def at_balls(machine: Machine, columns: dict[str, Array], room: Room, random: np.random.Generator) -> Measurement:
-    """Poses with the stylus in one of the balls at random, those that the travels allow."""
+    """Poses of kind `probe`, with the stylus in a random ball; poses outside the travels are dropped."""
     balls = room.balls or _default_balls(machine, room)
     keys = list(balls)
     which = random.integers(len(keys), size=len(columns["X"]))
@@ -300,7 +301,7 @@ def at_balls(machine: Machine, columns: dict[str, Array], room: Room, random: np
 
 
 def _default_balls(machine: Machine, room: Room) -> dict[str, tuple[float, float, float]]:
-    """Four balls of different height round the point where the tip is in the middle of the travels."""
+    """Four balls of different height around the tip in the middle of the travels, mm, workpiece frame."""
     middle = [sum(room.of(axis)) / 2 * axis.unit if not axis.rotary else 0.0 for axis in machine.axes]
     x, y, z = machine.tip(np.array([middle]), float(np.mean(room.tool_lengths)))[0].tolist()
     arms = ((60, 0, -20), (0, 60, 20), (-60, 0, 40), (0, -60, 0))
@@ -308,7 +309,7 @@ def _default_balls(machine: Machine, room: Room) -> dict[str, tuple[float, float
 
 
 def _lengths(columns: Mapping[str, Array]) -> Measurement:
-    """Distances between two places, the second taken from another row."""
+    """Poses of kind `length`: from the position of each row to that of the row before it."""
     found = {name: values for name, values in columns.items() if name not in "XYZ"}
     found |= {f"a{axis.lower()}": columns[axis] for axis in "XYZ"}
     found |= {f"b{axis.lower()}": np.roll(columns[axis], 1) for axis in "XYZ"}
@@ -316,10 +317,10 @@ def _lengths(columns: Mapping[str, Array]) -> Measurement:
 
 
 def halton(count: int, sides: int, random: np.random.Generator) -> Array:
-    """So many points of the unit cube, (count, sides). `random` itself is drawn no number from.
+    """Points of a scrambled Halton sequence in the unit cube, (count, sides). No number is drawn from `random` itself.
 
-    The n-th point has, along each side, the digits of n to a prime base, mirrored behind the point; shuffling the
-    digits of each place takes away the stripes that the larger primes have.
+    Each coordinate of point n is the radical inverse of n in a prime base: its digits mirrored behind the point. A
+    random permutation of the digits at each place removes the stripes of larger bases.
     """
     own = random.spawn(1)[0]
     primes: list[int] = []
@@ -332,7 +333,7 @@ def halton(count: int, sides: int, random: np.random.Generator) -> Array:
 
 
 def _mirrored(count: int, base: int, random: np.random.Generator) -> Array:
-    """The numbers 0 ... count - 1 as digits of this base behind the point, until one no longer counts: (count,)."""
+    """Radical inverses of 0 ... count - 1 in this base, with permuted digits down to `FINEST`, (count,)."""
     places = int(np.ceil(-np.log2(FINEST) / np.log2(base))) - 1
     rest, place, found = np.arange(count), 1.0 / base, np.zeros(count)
     for digits in np.tile(np.arange(base), (places, 1)):

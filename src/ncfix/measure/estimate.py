@@ -206,8 +206,8 @@ class Calibration:
     estimate    its solution
     scale       factor on the standard deviations: 1 if the noise was known and explains the residuals
     remarks     remarks for the user: undetermined coefficients, outliers, noise
-    before_um   rms residual of lengths with the given machine, set-up fitted, um; after_um: with the result; NaN if only
-                angles were measured
+    before_um   rms residual of lengths with the given machine, set-up fitted, um; after_um: with the result;
+                NaN if only angles were measured
     """
 
     machine: Machine

@@ -1,14 +1,14 @@
-"""Kind `length`: the distance between two positions (interferometer, gauge), or a ball-bar's about its centre.
+"""Kind `length`: distance between two positions (interferometer, gauge), or from the centre of a ball-bar.
 
-Gauge: the machine goes from position a to position b; `length` is how far that really was, `nominal` how far it should
-have been (the distance commanded, if there is no such column). With `# setup: unknown` all lengths of a set have an
-unknown part in common: an artefact that is not calibrated. Ball-bar: `length` is the distance of the tip from a centre
-ball; where that ball really is, (u, v, w), is unknown per set, and with `# setup: unknown` so is the bar's length.
+Gauge: the machine moves from position a to position b. `length` is the measured distance, `nominal` the intended one
+(by default the commanded distance). With `# setup: unknown` all lengths of a set share an unknown offset, as of an
+uncalibrated artefact. Ball-bar: `length` is the distance of the tip from a centre ball. The offset (u, v, w) of that
+ball is unknown per set, and with `# setup: unknown` so is the length of the bar.
 
-A ball-bar test also says something by itself: where the centre is, size and form, and the figures of ISO 230-4 for
-circles. The set-up (u, v, w) is taken off by least squares (Esmaeili Marzdashti 2021, Eq. 15-17); what is left of the
-radius has a mean, the size, and a shape, the form. A test whose places lie in one plane is a circle: the two ways round
-it are told apart, and compared.
+`ball_bar_figures` evaluates a ball-bar test: centre offset, size and form, and for circles the figures of ISO 230-4.
+The centre offset is removed by least squares (Esmaeili Marzdashti 2021, Eq. 15-17); the mean of the remaining radial
+deviation is the size, its range the form. If all positions lie in a plane, the test is a circle, and both directions
+of contouring are evaluated and compared.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from ncfix.measure.observation import Observation, Unknowns, linear_axes
 from ncfix.values import frozen
 
 SHORT = 1e-9
-"""mm: a length that has no direction."""
+"""Smallest length that has a direction, mm."""
 FLAT = 1e-3
-"""Places whose third extent is this share of the first lie in a plane."""
+"""Largest ratio of the third to the first singular value of positions that lie in a plane."""
 STEPS = 360
-"""Angles at which the two ways round are compared."""
+"""Number of angles at which both directions of contouring are compared."""
 UM = 1e3
 
 
 class Length(Observation):
-    """What gauges and ball-bars have in common: one length a row, and what is unknown of it per set."""
+    """Base class of gauges and ball-bars: one length per row, with an unknown offset per set."""
 
     def __init__(self, measurement: Measurement, machine: Machine) -> None:
         super().__init__(measurement, machine)
@@ -42,7 +42,7 @@ class Length(Observation):
 
     @property
     def components(self) -> tuple[str, ...]:
-        """One length a row."""
+        """See `Observation`: one length per row."""
         return ("length",)
 
     def _constant(self) -> Unknowns:
@@ -56,7 +56,7 @@ class Length(Observation):
 
 
 class Gauge(Length):
-    """Rows of ax ay az bx by bz length [nominal]."""
+    """Observation of a gauge: rows of ax ay az bx by bz length [nominal]."""
 
     def __init__(self, measurement: Measurement, machine: Machine) -> None:
         super().__init__(measurement, machine)
@@ -73,7 +73,7 @@ class Gauge(Length):
 
     @cached_property
     def unknowns(self) -> Unknowns:
-        """The artefact's length per set, if it is not known."""
+        """The offset of the artefact's length per set, if it is unknown."""
         return self._constant()
 
     def predict(self, machine: Machine, unknowns: Array) -> Array:
@@ -93,7 +93,7 @@ class Gauge(Length):
 
 
 class BallBar(Length):
-    """Rows of cx cy cz radius length."""
+    """Observation of a ball-bar: rows of cx cy cz radius length."""
 
     def __init__(self, measurement: Measurement, machine: Machine) -> None:
         super().__init__(measurement, machine)
@@ -105,13 +105,13 @@ class BallBar(Length):
 
     @cached_property
     def unknowns(self) -> Unknowns:
-        """The centre's offset u v w per set, and the bar's length if it is not known."""
+        """The centre offset u v w per set, and the offset of the bar's length if it is unknown."""
         if self.setup == "none":
             return Unknowns.joined([])
         return Unknowns.joined([Unknowns.vectors("centre of set ", self.set_names), self._constant()])
 
     def predict(self, machine: Machine, unknowns: Array) -> Array:
-        """See `Observation`; `radius` is what the commanded circle has, so its own rounding does not matter."""
+        """See `Observation`; `radius` plus deviations, so rounding of the commanded positions does not matter."""
         arm = machine.actual_tip(self.q, self.state) - self.centre
         constant = np.zeros(len(arm))
         if self.setup != "none":
@@ -140,10 +140,14 @@ class BallBar(Length):
 
 @frozen
 class CircularDeviations:
-    """ISO 230-4, um. `G` circular deviation of each way round, `Gb` of both, `H` hysteresis, `F` radial deviation.
+    """Figures of a circular test by ISO 230-4, um, about the least-squares centre.
 
-    Clockwise and the other way are as seen against the normal of the plane that points up (+z, else +y, else +x); NaN
-    for a way that was not run. D: mean radius of both ways minus the nominal one. All about the least-squares centre.
+    G_...    circular deviation of each direction of contouring; Gb: of both
+    H        hysteresis
+    F_max, F_min  largest and smallest radial deviation
+    D        mean of the mean radial deviations of both directions
+    The direction is seen against the plane's normal that points up (+z, else +y, else +x). NaN for a direction that was
+    not run.
     """
 
     G_clockwise: float
@@ -157,14 +161,14 @@ class CircularDeviations:
 
 @frozen
 class BallBarFigures:
-    """One set of a ball-bar test, um.
+    """Figures of one set of a ball-bar test, um.
 
-    name       of the set
-    centre     (u, v, w), where the centre ball was off, in axes of the workpiece
-    size       mean radius minus the nominal one
-    form       largest minus smallest radius after that; form_rms its standard deviation
-    radial     largest minus smallest radius as measured
-    circle     if the places lie in a plane
+    name       name of the set
+    centre     (u, v, w) offset of the centre ball, workpiece frame
+    size       mean radius minus nominal radius
+    form       range of the radius about the fitted centre; form_rms: its standard deviation
+    radial     range of the radius as measured
+    circle     figures of ISO 230-4 if the positions lie in a plane, else None
     """
 
     name: str
@@ -177,7 +181,7 @@ class BallBarFigures:
 
 
 def ball_bar_figures(measurement: Measurement, machine: Machine) -> Iterator[BallBarFigures]:
-    """The figures of each set of a ball-bar measurement; nothing for other measurements."""
+    """The figures of each set of a ball-bar measurement; none for other measurements."""
     if measurement.kind != "length" or "radius" not in measurement.columns or "length" not in measurement.columns:
         return
     seen = BallBar(measurement, machine)
@@ -188,7 +192,7 @@ def ball_bar_figures(measurement: Measurement, machine: Machine) -> Iterator[Bal
 
 
 def _set_figures(name: str, way: Array, off: Array) -> BallBarFigures:
-    """`way` (n, 3): unit vectors from the centre; `off` (n,): measured minus nominal radius, mm."""
+    """The figures of a set. way (n, 3): unit vectors from the centre; off (n,): measured minus nominal radius, mm."""
     flat = _normal(way)
     columns = -way if flat is None else -way @ _in_plane(flat)
     fitted = np.linalg.lstsq(np.column_stack([columns, np.ones(len(off))]), off, rcond=None)[0]
@@ -204,7 +208,7 @@ def _set_figures(name: str, way: Array, off: Array) -> BallBarFigures:
 
 
 def _normal(way: Array) -> Array | None:
-    """The normal of the plane in which the places lie, pointing up; None if they do not lie in one."""
+    """The upward normal of the plane of unit vectors `way` (n, 3); None if they do not lie in a plane."""
     _, values, axes = np.linalg.svd(way, full_matrices=False)
     if values[2] > FLAT * values[0]:
         return None
@@ -214,14 +218,14 @@ def _normal(way: Array) -> Array | None:
 
 
 def _in_plane(normal: Array) -> Array:
-    """Two directions of a plane that make a right-handed triad with its normal, (3, 2)."""
+    """Two unit vectors in a plane, (3, 2), that form a right-handed triad with its normal."""
     first = np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())])
     first = first / np.linalg.norm(first)
     return np.column_stack([first, np.cross(normal, first)])
 
 
 def _circle(place: Array, radius: Array) -> CircularDeviations:
-    """`place` (n, 2) unit vectors in the order of the run; `radius` (n,) minus the nominal one about the centre, um."""
+    """The figures of a circle. place (n, 2): unit vectors in order of the path; radius (n,): radial deviation, um."""
     angle = np.unwrap(np.arctan2(place[:, 1], place[:, 0]))
     turning = np.sign(np.gradient(angle)) if len(angle) > 1 else np.ones(len(angle))
     ways = [radius[turning < 0], radius[turning > 0]]
@@ -237,7 +241,7 @@ def _circle(place: Array, radius: Array) -> CircularDeviations:
 
 
 def _apart(angle: Array, radius: Array, turning: Array) -> float:
-    """The largest difference of the two ways at one angle, where both were run."""
+    """Hysteresis, um: largest difference of both directions at one angle, where both were run."""
     grid = np.linspace(0, 2 * np.pi, STEPS, endpoint=False)
     found = []
     for sign in (-1.0, 1.0):

@@ -1,11 +1,11 @@
-"""What an instrument sees of a machine: the one interface through which calibration, plans and simulation look.
+"""The interface of observation models, by which calibration, plans and simulation see a measurement.
 
-An observation has `values` (m,), the numbers that were read, one after another: all components of the first row, then
-of the second. `predict` says what they would be for a machine and a guess of what is unknown about the set-up; `design`
-and `unknown_design` are its derivatives to first order, by the coefficients of effects and by those unknowns. The
-design matrix `projection(q) . Jacobian(q) . basis(state)` is made here and nowhere else.
+An observation has `values` (m,), the readings: all components of the first row, then of the second, ... `predict`
+computes them for a machine and for assumed unknowns of the set-up. `design` and `unknown_design` are its derivatives by
+coefficients of effects and by those unknowns. The design matrix `projection(q) . Jacobian(q) . basis(state)` is made by
+observations only.
 
-Behind it: the branches of a machine by themselves, and the small algebra of points and rotations that instruments need.
+Also here: the tool and workpiece branch of a machine, and the algebra of points and rotations for instruments.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from ncfix.measure.measurement import Measurement, groups
 from ncfix.values import frozen
 
 LEVER = 100.0
-"""mm: noise of an angle, where only that of a length is given, is that of a length at this distance."""
+"""Distance, mm, at which the noise of an angle is that of a length, if only the latter is given."""
 FREEDOM_LEAST = 10
-"""Degrees of freedom below which repeats do not tell the noise: what they say may be off by a quarter."""
+"""Smallest number of degrees of freedom at which repeats determine the noise (to about a quarter)."""
 DEFAULT_NOISE = 1e-3
-"""mm, where neither a header nor repeats tell; only the ratio of noises matters then."""
+"""Noise of a length, mm, if neither header nor repeats determine it; only ratios of noises matter then."""
 TOOL, WORKPIECE = "tool", "workpiece"
 
 
 @frozen
 class Unknowns:
-    """What is unknown about a set-up besides the machine's errors.
+    """The unknowns of the set-ups of a measurement.
 
-    labels  (k) in words
+    labels  names of the k unknowns, in words
     start   (k,) first guess, mm or rad
-    spread  (k,) how far from it the truth is likely to be: used to make up set-ups for simulations
+    spread  (k,) standard deviation of the truth from it, for simulated set-ups
     """
 
     labels: tuple[str, ...]
@@ -48,21 +48,21 @@ class Unknowns:
 
     @staticmethod
     def joined(parts: Sequence[Unknowns]) -> Unknowns:
-        """Several one after another."""
+        """Concatenate several sets of unknowns."""
         labels = tuple(label for part in parts for label in part.labels)
         start = np.concatenate([np.zeros(0), *(part.start for part in parts)])
         return Unknowns(labels, start, np.concatenate([np.zeros(0), *(part.spread for part in parts)]))
 
     @staticmethod
     def vectors(what: str, names: Sequence[str], start: Array | float = 0.0, spread: float = 0.05) -> Unknowns:
-        """Vectors of three, one for each name: `what` name, x y z; `start` (3,) or (names, 3), mm as `spread`."""
+        """Unknown vectors x y z, one for each name, labelled `what` + name; start (3,) or (names, 3), as `spread`."""
         labels = tuple(f"{what}{name} {axis}" for name in names for axis in "xyz")
         found = np.broadcast_to(np.asarray(start, dtype=np.float64), (len(names), 3)).reshape(-1)
         return Unknowns(labels, np.array(found), np.full(len(labels), spread))
 
 
 class Observation(ABC):
-    """One measurement, as seen by one kind of instrument."""
+    """Observation model of one measurement by one kind of instrument."""
 
     def __init__(self, measurement: Measurement, machine: Machine) -> None:
         self.measurement = measurement
@@ -72,7 +72,7 @@ class Observation(ABC):
         self.set_names, self.set_index = groups(measurement.sets)
 
     def doubts(self, machine: Machine) -> Iterator[Message]:
-        """What had to be assumed of the set-up and matters with the errors of this machine."""
+        """Remarks on assumptions about the set-up that matter with the errors of this machine."""
         yield from ()
 
     # -- what was read ------------------------------------------------------------------------------------------------
@@ -85,23 +85,23 @@ class Observation(ABC):
     @property
     @abstractmethod
     def unknowns(self) -> Unknowns:
-        """What is unknown about the set-up."""
+        """The unknowns of the set-up."""
 
     @abstractmethod
     def predict(self, machine: Machine, unknowns: Array) -> Array:
-        """What the instrument would read, exactly, shape (m,)."""
+        """The exact readings of the instrument on this machine, (m,), mm or rad; unknowns (k,)."""
 
     @abstractmethod
     def design(self, effects: Sequence[Effect]) -> Array:
-        """The derivative of `predict` by the effects' coefficients at zero error, shape (m, p)."""
+        """Derivative of `predict` by the coefficients of effects at zero error, (m, p)."""
 
     @abstractmethod
     def unknown_design(self, unknowns: Array) -> Array:
-        """The derivative of `predict` by the unknowns, shape (m, k)."""
+        """Derivative of `predict` by the unknowns, at `unknowns` (k,): (m, k)."""
 
     @cached_property
     def values(self) -> Array:
-        """What was read, shape (m,); NaN where nothing was yet."""
+        """The readings, (m,), mm or rad; NaN for those still to be measured."""
         rows = np.full((len(self.measurement), len(self.components)), np.nan)
         for index, name in enumerate(self.components):
             if name in self.measurement.columns:
@@ -115,39 +115,39 @@ class Observation(ABC):
 
     @property
     def extra_sigma(self) -> Array:
-        """Their standard deviations, (e,), mm."""
+        """Standard deviations of the extra values, (e,), mm."""
         return np.zeros(0)
 
     @cached_property
     def rows(self) -> Ints:
-        """The row of each value; -1 for extra values."""
+        """Index of the row of each value, (m,); -1 for extra values."""
         own = np.repeat(np.arange(len(self.measurement)), len(self.components))
         return np.concatenate([own, np.full(len(self.extra_values), -1)])
 
     @property
     def angular(self) -> tuple[bool, ...]:
-        """Which components are angles."""
+        """For each component, whether it is an angle."""
         return tuple(name in ("rx", "ry", "rz") for name in self.components)
 
     @property
     def value_names(self) -> tuple[str, ...]:
-        """What each value of the rows is, one after another."""
+        """Name of each value of the rows."""
         return self.components * len(self.measurement)
 
     @property
     def turns(self) -> Mask:
-        """Which values of the rows are angles, one after another."""
+        """Mask of the angles among the values of the rows."""
         return np.tile(np.array(self.angular, dtype=np.bool_), len(self.measurement))
 
     @property
     def um(self) -> Array:
-        """What each value is multiplied with to be in um, (m,); an angle counts as what it moves at half the reach."""
+        """Factor of each value to um, (m,); an angle counts as the displacement at half the machine's reach."""
         turns = np.concatenate([self.turns, np.zeros(len(self.extra_values), dtype=np.bool_)])
         return np.where(turns, 1e3 * max(LEVER, reach(self.machine) / 2), 1e3)
 
     @cached_property
     def sigma(self) -> Array:
-        """The standard deviation of each value, (m,), mm or rad: from the header, else from repeats, else 1 um."""
+        """Standard deviation of each value, (m,), mm or rad: from the header, else from repeats, else 1 um."""
         lengths, angles = self.measurement.noise
         if lengths is None:
             lengths = self._repeatability or DEFAULT_NOISE
@@ -156,22 +156,22 @@ class Observation(ABC):
 
     @property
     def noise_stated(self) -> bool:
-        """Whether the header says how large the noise is; of angles alone theirs will do."""
+        """Whether the header states the noise: of lengths, or of angles if there are only angles."""
         lengths, angles = self.measurement.noise
         return lengths is not None or (angles is not None and bool(self.turns.all()))
 
     @property
     def noise_known(self) -> bool:
-        """Whether the noise was given or can be told from repeats."""
+        """Whether the noise is stated or follows from repeats."""
         return self.noise_stated or self._repeatability is not None
 
     @cached_property
     def _repeatability(self) -> float | None:
-        """The repeatability of its lengths, mm; computed once."""
+        """Repeatability of the lengths, mm; None if repeats are too few; cached."""
         return repeatability(self.measurement, self.components, self.angular)
 
     def with_values(self, values: Array) -> Measurement:
-        """The measurement with these values (m,) read; those that belong to no row are left out."""
+        """The measurement with these readings (m,); extra values are ignored."""
         rows = values[: len(self.measurement) * len(self.components)].reshape(-1, len(self.components))
         return self.measurement.with_columns(dict(zip(self.components, rows.T, strict=True)))
 
@@ -179,7 +179,7 @@ class Observation(ABC):
 def repeatability(
     measurement: Measurement, components: tuple[str, ...], angular: tuple[bool, ...], rows: Mask | None = None
 ) -> float | None:
-    """The pooled standard deviation over repeats of a state of what is not `angular`; None below 10 degrees of freedom.
+    """Pooled standard deviation of the non-`angular` components over repeats; None below `FREEDOM_LEAST`.
 
     Repeats are rows of one set, pose, direction and tool, among `rows` (n,) if given; time and temperatures may differ.
     """
@@ -202,9 +202,7 @@ def repeatability(
 
 
 def _states(measurement: Measurement) -> list[str]:
-    """The state of each row, as text: what repeats of it share; none where nothing but readings was noted, or of a test
-    of drift.
-    """
+    """The state of each row that repeats share, as text; empty for a test of drift, or if only readings were noted."""
     if measurement.stays:
         return []
     labels = [value for name, value in measurement.labels.items() if name != "repeat"]
@@ -218,9 +216,7 @@ def _states(measurement: Measurement) -> list[str]:
 
 
 def vector_columns(index: Ints, count: int, matrices: Array) -> Array:
-    """The derivative by `count` vectors, (n, r, 3 count), of rows that depend on vector `index` (n,) by matrices
-    (n, r, 3).
-    """
+    """Derivatives (n, r, 3 count) by `count` vectors; row i depends on vector `index[i]` by `matrices[i]` (r, 3)."""
     columns, each = np.zeros((len(index), matrices.shape[1], 3 * count)), np.arange(len(index))
     for k in range(3):
         columns[each, :, 3 * index + k] = matrices[:, :, k]
@@ -228,7 +224,7 @@ def vector_columns(index: Ints, count: int, matrices: Array) -> Array:
 
 
 def linear_axes(measurement: Measurement, machine: Machine) -> list[int]:
-    """The indices of the axes X Y Z; raises `ConfigError` NCF610 if the machine has not all three."""
+    """Indices of the axes X, Y, Z; raises `ConfigError` NCF610 if the machine lacks one."""
     names = list(machine.axis_names)
     for axis in "XYZ":
         if axis not in names:
@@ -237,7 +233,7 @@ def linear_axes(measurement: Measurement, machine: Machine) -> list[int]:
 
 
 def base_from_workpiece(machine: Machine, q: Array) -> Array:
-    """The nominal rotation of the workpiece's axes against the base, (n, n_axes) -> (n, 3, 3)."""
+    """Nominal rotation base_from_workpiece (n, 3, 3) for poses q (n, n_axes)."""
     turned = np.broadcast_to(np.eye(3), (len(q), 3, 3))
     for index in reversed(range(len(machine.axes))):
         if machine.axes[index].workpiece_side:
@@ -246,9 +242,9 @@ def base_from_workpiece(machine: Machine, q: Array) -> Array:
 
 
 def branch(machine: Machine, side: str) -> tuple[Machine, list[int]]:
-    """The tool or the workpiece branch as a machine of its own, and which of the axes it has.
+    """The tool or workpiece branch as a machine of its own, and the indices of its axes.
 
-    The other end stands on the foundation: of the tool branch `nominal` is base_from_tool, of the workpiece branch
+    Its other end is the foundation: `nominal` of the tool branch is base_from_tool, of the workpiece branch
     workpiece_from_base.
     """
     held = side == WORKPIECE
@@ -265,12 +261,12 @@ def branch(machine: Machine, side: str) -> tuple[Machine, list[int]]:
 
 
 def spindle_turn(machine: Machine, angle_deg: Array) -> Array:
-    """The rotation of what the spindle holds, about the tool direction, (n,) degree -> (n, 3, 3)."""
+    """Rotation (n, 3, 3) of the spindle about the tool direction, by angles (n,) degree."""
     return se3.rotation(np.deg2rad(angle_deg)[:, None] * np.asarray(machine.tool.direction))
 
 
 def best_rotation(moved: Array, fixed: Array) -> Array:
-    """The rotation R that takes vectors `fixed` nearest to `moved` (both (n, 3)), after Kabsch."""
+    """The rotation R (3, 3) that minimizes |moved - R fixed| for vectors (n, 3), by Kabsch."""
     left, _, right = np.linalg.svd(moved.T @ fixed)
     sign = np.sign(np.linalg.det(left @ right))
     return left @ np.diag([1.0, 1.0, sign]) @ right

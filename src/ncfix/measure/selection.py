@@ -1,7 +1,7 @@
-"""Which effects a calibration estimates: those of the machine, by name or pattern, new ones, or a named model.
+"""The effects that a calibration estimates: those of the machine, by name or pattern, new ones, or a named model.
 
-New effects get a basis that leaves out what another effect has: straightness no linear part (that is squareness),
-radial and tilt motions of a rotary axis no part once per revolution (that is where its axis line lies).
+New effects get a basis without the part that belongs to another effect: straightness has no linear part (that is
+squareness), radial and tilt motions of a rotary axis no first harmonic (that is the location of its axis line).
 
 Named models are those of S. Esmaeili Marzdashti, PhD thesis, Polytechnique Montreal, 2021. Location errors are
 inter-axis errors, carried by what follows (`carried`). Error motions are ordinary cubics in mm and rad, Eq. 19; `b` is
@@ -28,7 +28,7 @@ from ncfix.toml_text import did_you_mean
 from ncfix.values import frozen
 
 ALL, LOCATIONS = "all", "E?0?"
-"""Patterns of all effects, and of where axes lie."""
+"""The word for all effects, and the pattern of all location errors."""
 TERM = re.compile(r"([XYZABC][A-Z])(\d|b)(?:-(\d))?")
 RADIAN = 180 / np.pi
 """The file's unit of a rotary axis is the degree: this scale makes u radians."""
@@ -38,8 +38,8 @@ RADIAN = 180 / np.pi
 class Selection:
     """The effects of a machine and which of them are to be estimated.
 
-    effects  all of them, those of the machine first
-    free     for each whether it is estimated
+    effects  all effects, those of the machine first, then new ones
+    free     for each effect, whether it is estimated
     """
 
     effects: tuple[Effect, ...]
@@ -57,7 +57,7 @@ class Selection:
 
     @property
     def start(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        """Their present values."""
+        """Present values of the estimated coefficients, (p,)."""
         return np.array([value for effect in self.estimated for value in effect.coefficients])
 
     def machine(self, machine: Machine, coefficients: Sequence[float]) -> Machine:
@@ -72,7 +72,7 @@ class Selection:
 
 
 def labels_of(effect: Effect, among: Sequence[Effect]) -> list[str]:
-    """A name for each coefficient, told apart from those of other effects of that name."""
+    """A name for each coefficient, unique even if other effects in `among` have the same name."""
     same = [other for other in among if other.name == effect.name]
     head = effect.name
     if len(same) > 1:
@@ -92,12 +92,13 @@ def _told_apart_by(effect: Effect) -> tuple[str, str | None, str | None]:
 def select(
     machine: Machine, wanted: str | None = None, reference: Sequence[float] | None = None, knots: int = 0
 ) -> Selection:
-    """The effects that are meant by a list such as `EC0Y,E?X,EZZ`, by `all`, or by the name of a model;
-    names of physical effects (`ncfix.machine.effects`) may stand in the list.
+    """The effects selected by a list such as `EC0Y,E?X,EZZ`, by `all`, or by the name of a model.
 
-    Nothing given means those of the machine; a machine without effects gets all of them, an arm where its joints lie:
-    measurements of arms hardly tell more, and what is missing then is found by its name. `reference` is the point to
-    which new effects refer; with `knots` the new error motions of linear axes are piecewise, with so many knots.
+    wanted     the list; it may contain names of physical effects (`ncfix.machine.effects`). None: those of the machine;
+               if it has none, all effects, but for an arm its location errors only, as its data hardly determine more
+    reference  point to which new effects refer, mm
+    knots      number of knots of new error motions of linear axes; 0: cubics
+
     Raises `UsageError` NCF635.
     """
     point = None if reference is None else (float(reference[0]), float(reference[1]), float(reference[2]))
@@ -114,27 +115,27 @@ def select(
 
 @frozen
 class _Wanted:
-    """What a list of names means: names and patterns of errors, and the effects of names of the library."""
+    """A parsed list of names: names and patterns of errors, and effects of the library of physical effects."""
 
     patterns: tuple[str, ...]
     physical: tuple[Effect, ...]
 
     @staticmethod
     def of(machine: Machine, text: str) -> _Wanted:
-        """A list such as `EC0Y,E?X,wind-up-X`."""
+        """Parse a list such as `EC0Y,E?X,wind-up-X`."""
         names = [name.strip() for name in text.split(",") if name.strip()]
         known = library(machine)
         physical = tuple(effect for name in names if name in known for effect in known[name].effects)
         return _Wanted(tuple(name for name in names if name not in known), physical)
 
     def has(self, effect: Effect) -> bool:
-        """Whether an effect that is there is meant."""
+        """Whether the list selects an existing effect."""
         named = any(_matches(effect.name, pattern) for pattern in self.patterns)
         return named or any(form(effect) == form(each) for each in self.physical)
 
 
 def _with_new(there: Sequence[Effect], free: Sequence[bool], new: Sequence[Effect]) -> Selection:
-    """Effects that are there, estimated or held, and new ones, each of them once."""
+    """The selection of existing effects, estimated or held, and new ones without duplicates, all estimated."""
     added = tuple(dict.fromkeys(new))
     return Selection((*there, *added), (*free, *(True for _ in added)))
 
@@ -144,14 +145,14 @@ def _matches(name: str, pattern: str) -> bool:
 
 
 def form(effect: Effect) -> Effect:
-    """An effect without its numbers."""
+    """An effect without coefficients and covariance, for comparison."""
     return replace(effect, coefficients=(), covariance=None)
 
 
 def _new(
     machine: Machine, name: str, present: set[str], point: tuple[float, float, float] | None, knots: int
 ) -> list[Effect]:
-    """Effects of this name or pattern that the machine does not have yet."""
+    """New effects that match a name or pattern and that the machine does not have. Raises `UsageError` NCF635."""
     possible = [each for each in candidate_effects(machine, knots) if _matches(each.name, name)]
     fresh = [each for each in possible if each.name not in present]
     if fresh or any(_matches(each, name) for each in present):
@@ -165,18 +166,18 @@ def _new(
 
 
 def candidate_effects(machine: Machine, knots: int = 0) -> list[Effect]:
-    """Every location error and error motion that can matter for this machine, zero, with its default basis."""
+    """All location errors and error motions that can matter for this machine, zero, with default bases."""
     found = []
     for axis in machine.axes:
         names = [f"E{component}0{axis.name}" for component in _located(machine, axis)]
         names += [f"E{component}{axis.name}" for component in COMPONENTS]
         found += [default(machine, name, knots) for name in names]
-    along = int(np.abs(np.asarray(machine.tool.direction)).argmax())  # there it is the length of the tool, or nothing
+    along = int(np.abs(np.asarray(machine.tool.direction)).argmax())  # an error along it is the tool length, or nothing
     return found + [default(machine, f"E{c}0{SPINDLE}") for k, c in enumerate(COMPONENTS) if k % 3 != along]
 
 
 def _located(machine: Machine, axis: Axis) -> list[str]:
-    """Location errors that are not without effect; the zero offset only of joints of an arm."""
+    """Components of the location errors that have an effect; the zero offset only for joints of an arm."""
     along = [k for k in range(3) if abs(np.asarray(axis.error_axes[k]) @ np.asarray(axis.direction)) > 1 - 1e-9]
     across = [COMPONENTS[k] for k in range(3) if k not in along]
     turns = [COMPONENTS[3 + k] for k in range(3) if k not in along or (axis.rotary and is_arm(machine.axes))]
@@ -199,20 +200,20 @@ def default(machine: Machine, name: str, knots: int = 0) -> Effect:
 
 
 def _turning(axis: Axis, name: str) -> Basis:
-    """Harmonics; the first one of radial and tilt motions belongs to the location of the axis line."""
+    """Harmonics; without the first one for radial and tilt motions, which is the location of the axis line."""
     along = _along(axis, name)
     return Fourier(order=(1, 2) if along else (2, 3))
 
 
 def _straight(axis: Axis, name: str) -> Basis:
-    """Powers; the first of a linear axis's straightness is its squareness."""
+    """Powers up to 3; without the first one for straightness of a linear axis, which is its squareness."""
     shift = name[1] in "XYZ"
     first = 2 if not axis.rotary and shift and not _along(axis, name) else 1
     return Polynomial(degree=tuple(range(first, 4)))
 
 
 def _piecewise(axis: Axis, name: str, knots: int) -> Basis:
-    """Parabolas that join smoothly at evenly spaced knots; of straightness without mean and slope (Soons, 2.1, 2.2)."""
+    """Parabolas joined smoothly at equidistant knots; for straightness without mean and slope (Soons, 2.1, 2.2)."""
     inside = tuple(float(place) for place in np.linspace(-1, 1, knots + 2)[1:-1])
     straight = name[1] in "XYZ" and not _along(axis, name)
     return Truncated(inside, 2, (2,), (-1.0, 1.0)) if straight else Truncated(inside, 2, (1, 2))
@@ -229,7 +230,7 @@ def _along(axis: Axis, name: str) -> bool:
 
 @frozen
 class Model:
-    """A named set: location errors, and terms of error motions such as `YX2-3` or `BBb`."""
+    """A named model: location errors, and terms of error motions such as `YX2-3` (powers) or `BBb` (backlash)."""
 
     name: str
     title: str

@@ -1,13 +1,13 @@
-"""Kinds `tcp`, `tcp6` and `probe`: where the tip of the tool really is, relative to the workpiece or to balls on it.
+"""Kinds `tcp`, `tcp6` and `probe`: position of the tool tip relative to the workpiece, or to balls on it.
 
-Kinds `tcp` and `tcp6` (R-test, ball plates, machined parts) read actual minus nominal, plus where the instrument's own
-zero lies. With the actual pose (R, p), the nominal one (R0, p0), ball offset b and stylus offset t, kind `tcp` reads
+Kinds `tcp` and `tcp6` (R-test, ball plates, machined parts) read actual minus nominal, plus the zero offset of the
+instrument. With the actual pose (R, p), the nominal one (R0, p0), ball offset b and stylus offset t, kind `tcp` reads
 p + R t - p0 - b in the workpiece frame.
 
-Kind `probe` (SAMBA, RUMBA, chase-the-ball) reads axis positions with which the stylus tip sits in the centre of a ball.
-The tip of the real machine at the positions read is where the ball is: p(m) + R(m) t = P. To first order the position
-read is m - A^-1 (p(m) + R t - P), A the derivative of the tip by the linear axes; that is what `predict` gives, and at
-the true positions it is exact. Ball positions P (workpiece frame) and stylus offsets t (tool frame) are unknown.
+Kind `probe` (SAMBA, RUMBA, chase-the-ball) reads the axis positions m at which the stylus tip is in the centre of a
+ball: p(m) + R(m) t = P. To first order the reading is m - A^-1 (p(m) + R t - P), with A the derivative of the tip by
+the linear axes. `predict` returns this, which is exact at the true positions. Ball positions P (workpiece frame) and
+stylus offsets t (tool frame) are unknown.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from ncfix.measure.observation import (
 SAME = 1e-9
 BALL, RIGID, NONE = "ball", "rigid", "none"
 TILT = 1e-4
-"""rad: how far an instrument may stand askew, in simulations."""
+"""Standard deviation of an instrument's tilt in simulations, rad."""
 READ = ("mx", "my", "mz")
 COVERAGE = 2.0
-"""Calibrated distances come with an expanded uncertainty, k = 2, as certificates state it."""
+"""Coverage factor k of the uncertainty of calibrated distances, as certificates state it."""
 
 
 class TipErrors(Observation):
-    """Rows of dx dy dz [rx ry rz]."""
+    """Observation of kinds `tcp` and `tcp6`: rows of dx dy dz [rx ry rz]."""
 
     def __init__(self, measurement: Measurement, machine: Machine) -> None:
         super().__init__(measurement, machine)
@@ -49,24 +49,24 @@ class TipErrors(Observation):
         self.tool_names, self.tool_index = groups([f"{value:g}" for value in measurement.column("tool_length")])
         self.held = spindle_turn(machine, measurement.column("spindle_deg"))
         self.observed_turn = base_from_workpiece(machine, self.q) if measurement.header("frame") == "base" else None
-        """From workpiece axes to those in which the values are given, (n, 3, 3); None where these are the same."""
+        """Rotation (n, 3, 3) from the workpiece frame to the frame of the values; None if they are the same."""
 
     @property
     def components(self) -> tuple[str, ...]:
-        """The columns that there are; all, in a plan that has none."""
+        """The measured columns of the file; all possible ones for a plan without any."""
         every = (*SHIFTS, *TURNS) if self.measurement.kind == "tcp6" else SHIFTS
         return self.measurement.measured or every
 
     @cached_property
     def has_stylus(self) -> bool:
-        """Whether the stylus offset is seen apart from the ball's: there are tools, orientations or spindle angles."""
+        """Whether tools, orientations or spindle angles vary, so that stylus and ball offsets act differently."""
         turned = self.nominal[:, :3, :3] @ self.held
         vary = len(self.tool_names) > 1 or bool(np.abs(turned - turned[:1]).max() > SAME)
         return self.setup == BALL and vary
 
     @cached_property
     def unknowns(self) -> Unknowns:
-        """Ball offset per set and stylus offset per tool; or a rigid motion per set; or nothing."""
+        """By set-up: ball offset per set and stylus offset per tool; or a rigid motion per set; or none."""
         if self.setup == NONE:
             return Unknowns.joined([])
         parts = []
@@ -81,7 +81,7 @@ class TipErrors(Observation):
         return Unknowns.joined(parts)
 
     def predict(self, machine: Machine, unknowns: Array) -> Array:
-        """See `Observation`; what is unknown about angles is taken to first order."""
+        """See `Observation`; unknown angles are treated to first order."""
         actual = machine.actual(self.q, self.state)
         errors = np.zeros((len(self.measurement), 6))
         errors[:, :3] = actual[:, :3, 3] - self.nominal[:, :3, 3]
@@ -113,7 +113,7 @@ class TipErrors(Observation):
         return not all(self.angular)
 
     def _picked(self, errors: Array) -> Array:
-        """The components that were read, in the frame in which they were: (n, 6[, k]) -> (m[, k])."""
+        """Errors (n, 6[, k]) in the workpiece frame -> the components and frame that were read, (m[, k])."""
         parts = [errors[:, :3], errors[:, 3:]] if self._turns else [errors[:, :3]]
         if self.observed_turn is not None:
             parts = [np.einsum("nij,nj...->ni...", self.observed_turn, part) for part in parts]
@@ -123,7 +123,7 @@ class TipErrors(Observation):
         return turned.reshape(turned.shape[0] * turned.shape[1], *errors.shape[2:])
 
     def _setup(self, unknowns: Array, turned: Array) -> Array:
-        """The derivative by the unknowns with the tool turned like this, (m, k)."""
+        """Derivative (m, k) by the unknowns, for tool orientations `turned` (n, 3, 3)."""
         n = len(self.measurement)
         none, less = np.zeros((n, 3, 3)), np.broadcast_to(np.diag([-1.0, -1.0, -1.0]), (n, 3, 3))
         sets, tools = (self.set_index, len(self.set_names)), (self.tool_index, len(self.tool_names))
@@ -141,7 +141,7 @@ class TipErrors(Observation):
 
 
 class Probing(Observation):
-    """Rows of ball, mx my mz."""
+    """Observation of kind `probe`: rows of ball, mx my mz."""
 
     def __init__(self, measurement: Measurement, machine: Machine) -> None:
         super().__init__(measurement, machine)
@@ -158,10 +158,9 @@ class Probing(Observation):
         self.distances = [_distance(text, self.balls, measurement) for text in measurement.all_headers("distance")]
 
     def _consistent(self) -> tuple[Array, Array]:
-        """Where a perfect machine finds the balls on average, and the positions at which it would find them there.
+        """Mean ball positions (b, 3) of a perfect machine, and the axis positions (n, n_axes) at which it finds them.
 
-        Derivatives are taken at those: at the positions read, which err, what the set-up can and cannot explain would
-        be blurred by their errors.
+        Derivatives are taken at these positions: the errors of the positions read would blur what the set-up explains.
         """
         tips = self.machine.tip(self.q, self.state.tool_length)
         counts = np.bincount(self.ball_index)[:, None]
@@ -182,25 +181,25 @@ class Probing(Observation):
 
     @property
     def extra_sigma(self) -> Array:
-        """Half of their expanded uncertainties (k = 2), (e,), mm."""
+        """Standard deviations of the calibrated distances, (e,), mm: half their expanded uncertainties."""
         return np.array([uncertainty / COVERAGE for *_, uncertainty in self.distances])
 
     @cached_property
     def has_stylus(self) -> bool:
-        """Whether tools or orientations vary, so that the stylus offset is no common shift of all balls."""
+        """Whether tools or orientations vary, so that the stylus offset is not a common shift of all balls."""
         turned = self.nominal[:, :3, :3] @ self.held
         return len(self.tools) > 1 or bool(np.abs(turned - turned[:1]).max() > SAME)
 
     @cached_property
     def unknowns(self) -> Unknowns:
-        """Ball positions, starting from where a perfect machine would have found them; stylus offsets per tool."""
+        """Ball positions, starting from those of a perfect machine; stylus offsets per tool."""
         parts = [Unknowns.vectors("position of ball ", self.balls, self.found)]
         if self.has_stylus:
             parts.append(Unknowns.vectors("stylus offset of tool ", self.tools))
         return Unknowns.joined(parts)
 
     def predict(self, machine: Machine, unknowns: Array) -> Array:
-        """See `Observation`; exact where the values are."""
+        """See `Observation`; exact at the measured positions."""
         actual = machine.actual(self.q, self.state)
         gap = actual[:, :3, 3] - self._balls(unknowns)[self.ball_index]
         if self.has_stylus:
@@ -228,7 +227,9 @@ class Probing(Observation):
         return np.concatenate([rows, self._lengths_design(unknowns)])
 
     def with_bars(self, unknowns: Array, random: np.random.Generator) -> Array:
-        """The unknowns (k,) with the second ball of each calibrated distance as far away as its certificate has it."""
+        """The unknowns (k,) with the second ball of each calibrated distance moved to a random true distance, which
+        deviates from the certificate by its standard uncertainty.
+        """
         moved = unknowns.copy()
         for first, second, length, uncertainty in self.distances:
             balls = self._balls(moved)
