@@ -1,10 +1,10 @@
-"""The functions of `import ncfix`: what the verbs of the command line do, on values.
+"""The functions of `import ncfix`: the commands of the command line as Python functions.
 
-Programs, machines and measurements are values, or the paths of files with them. No file is touched unless its path is
-given: `output=` writes the result, whole or not at all; never in the place of an input, and in that of another file
-only if `force` says so. That is looked at before anything is computed. docs/api.md shows each function at work.
+Programs, machines and measurements are given as values or as paths of files. No file is written unless its path is
+given: `output=` writes the result, completely or not at all. It never replaces an input, and another existing file only
+with `force`. This is checked before anything is computed. docs/api.md shows each function at work.
 
-What is refused stands in the result; to write a result of which something is refused raises `RefusedError`, unless it
-is allowed. All errors are `ncfix.diagnostics.NcfixError`, with codes; a function called as no function can be, with two
-sources for one, say, raises TypeError.
+Refused motions are listed in the result; writing a result with refused motions raises `RefusedError`, unless they are
+allowed. All errors are `ncfix.diagnostics.NcfixError`, with codes. Wrong calls, for example with two sources for one
+argument, raise TypeError.
 """

@@ -1,4 +1,4 @@
-"""Measurements: planned, and what they say of a machine."""
+"""Functions for measurements: planning, calibration, diagnosis."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ def plan(
     output: PathName | None = None,
     force: bool = False,
 ) -> Planned:
-    """Choose the poses to be measured: those that tell most about the errors of a machine.
+    """Choose the poses to measure: those that determine the errors of a machine best.
 
     kind      "tcp", "tcp6", "probe" or "length"
-    room      where axes (mm and degree) and tip (mm) may go, tool lengths, balls
-    effects   those to be determined, as for `calibrate`; `separate`: those to be told apart
+    room      limits of axes (mm and degree) and tip (mm), tool lengths, balls
+    effects   effects to determine, as for `calibrate`; `separate`: effects to tell apart
     existing  a measurement that the new poses complete
     """
     from ncfix.measure.candidates import Room
@@ -76,13 +76,13 @@ def plan(
 
 @frozen(eq=False)
 class Calibrated:
-    """What measurements say of the errors of a machine.
+    """Result of a calibration.
 
     calibration  the estimate, with its covariance
-    prediction   how well the tip error is known over the travels
-    refused      why the result describes no machine, or not these measurements; empty if it does
-    remarks      what there is to say of the estimate
-    doubts       what is odd about the machine
+    prediction   uncertainty of the tip error over the travels
+    refused      why the result cannot describe a machine or does not fit the measurements; empty if it is accepted
+    remarks      messages on the estimate
+    doubts       messages on implausible properties of the machine
     """
 
     calibration: Calibration
@@ -93,7 +93,7 @@ class Calibrated:
 
     @property
     def machine(self) -> Machine:
-        """The machine with the errors that were estimated."""
+        """The machine with the estimated errors."""
         return self.calibration.machine
 
 
@@ -113,10 +113,10 @@ def calibrate(
 ) -> Calibrated:
     """Estimate the errors of a machine from measurements.
 
-    effects  names or patterns, or a model; None: those of the machine file, or of one without, all that can be (of an
-             arm where its joints lie)
+    effects  names or patterns, or a model; None: those of the machine file; if it has none, all that can be estimated
+             (for a measuring arm: the position of its joints)
     loss     "auto", "none", "huber" or "tukey"; the other arguments are those of `ncfix calibrate`
-    path     what the machine is called in messages
+    path     name of the machine in messages
     """
     from ncfix.machine import dumps
     from ncfix.machine.plausible import doubts
@@ -148,11 +148,11 @@ def diagnose(
     output: PathName | None = None,
     force: bool = False,
 ) -> Diagnosis:
-    """Say where machine and model disagree, and name the effect that is missing.
+    """Find where machine and model disagree, and name the missing effect.
 
-    without  names of effects that are not to be considered; `messages` of the result say which do not exist (NCF657)
-    since    the last file is of a later date than those before it: only what changed is found
-    output   where the machine with the effects added goes; nothing is written where there is nothing to add
+    without  names of effects that are excluded; `messages` of the result list names that do not exist (NCF657)
+    since    the last file is of a later date than the others: only what changed in between is sought
+    output   file for the machine with the effects added; nothing is written if there is nothing to add
     """
     from ncfix.diagnosis.diagnosis import diagnose as diagnosed
     from ncfix.diagnosis.presentation import with_provenance

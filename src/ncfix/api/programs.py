@@ -1,4 +1,4 @@
-"""Programs: corrected, compared, and how far the tool tip is off along them."""
+"""Functions for programs: correction, comparison, and tip errors along the path."""
 
 from __future__ import annotations
 
@@ -52,17 +52,17 @@ def fix(
     resolve: Resolve | None = None,
     output: PathName | None = None,
 ) -> Fixed:
-    """Rewrite a program so that this machine cuts what was meant.
+    """Rewrite a program so that this machine cuts what was intended.
 
-    setup          offsets, tools and where axes start, or a setup file; what it lacks raises `UsageError` NCF2xx
+    setup          offsets, tools and start positions, or a setup file; missing data raise `UsageError` NCF2xx
     strategy       `ncfix fix --strategy`
-    tolerance_um   how far the tool tip may leave the intended path
-    flatten        write loops, subprograms and cycles out where they cannot be corrected
-    figures        the errors before and after along the path (`report.error_before_um`, ...)
-    force          correct a program that has been corrected, for a machine that no machine is like, too; take the
-                   place of an existing output
-    allow_refused  write the output though motions had to be left uncorrected
-    resolve        gives the text of a subprogram by its name; None: files beside the program, if that is one
+    tolerance_um   largest deviation of the tool tip from the intended path
+    flatten        write loops, subprograms and cycles out where they cannot be corrected otherwise
+    figures        compute the errors along the path before and after (`report.error_before_um`, ...)
+    force          correct a program that is corrected already, or for an implausible machine; replace an existing
+                   output
+    allow_refused  write the output even if motions had to be left uncorrected
+    resolve        returns the text of a subprogram by its name; None: files beside the program, if it is a file
     """
     from ncfix.compensate import FixOptions
     from ncfix.compensate.driver import fix_flat, fix_program
@@ -88,9 +88,9 @@ def verify(
     setup: Setup | PathName | None = None,
     tolerance_um: float = 1.0,
 ) -> Compared:
-    """Compare what this machine cuts with `fixed` (a program, or its text) with what `original` means.
+    """Compare what this machine cuts with `fixed` (a program, or its text) to what `original` intends.
 
-    `within` of the result is the verdict; its figures are in um; `messages` say what was assumed.
+    `within` of the result is the verdict; its figures are in um; `messages` lists assumptions.
     """
     from ncfix.arguments import TOLERANCE_UM
     from ncfix.compensate.figures.verification import Compared, side_by_side
@@ -114,7 +114,7 @@ def verify(
 
 
 def _remark_of_stamp(program: Program) -> Iterator[Message]:
-    """What is said of a program that is to be what is meant, and has been corrected."""
+    """The warning for a program that is taken as the intended one although it has been corrected."""
     from ncfix.text import stamp
 
     block = stamp.find(program)
@@ -124,14 +124,14 @@ def _remark_of_stamp(program: Program) -> Iterator[Message]:
 
 @frozen(eq=False)
 class PathErrors:
-    """How far the tool tip of a machine is from where a program means it to be, n samples along the path.
+    """Errors of a machine's tool tip at n samples along the path of a program.
 
-    max_um, rms_um  the largest error, and the root mean square along the path; None where nothing was looked at
-    line            the line of the largest
-    lines           (n,) the line of each sample
-    intended        (n, 3) where the tip shall be in the workpiece, mm
-    error_um        (n, 3) where it is, less that
-    messages        what there is to say of following the program
+    max_um, rms_um  largest error, and root mean square along the path; None without samples
+    line            line of the largest error
+    lines           (n,) line of each sample
+    intended        (n, 3) intended tip in the workpiece, mm
+    error_um        (n, 3) actual minus intended tip
+    messages        remarks from following the program
     """
 
     max_um: float | None
@@ -163,9 +163,10 @@ def simulate(
     faults: Faults | None = None,
     seed: int = 0,
 ) -> PathErrors | Measurement:
-    """Say how far the tool tip of this machine is from where a program means it to be, along the whole path.
+    """Compute the error of this machine's tool tip along the whole path of a program.
 
-    Of a measurement plan: the plan filled in as this machine would be measured, with the `faults` of measuring.
+    For a measurement plan: the plan, filled in with what this machine would measure, with the measuring errors
+    `faults`.
     """
     from ncfix.measure.measurement import Measurement
 

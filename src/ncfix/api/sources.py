@@ -1,4 +1,4 @@
-"""What functions are given: values, or the paths of files with them; and where results may go."""
+"""Arguments of the API functions, given as values or as paths of files; and checks of their outputs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ONE_SOURCE = "a path or a text is needed, and not both"
 
 
 def load_machine(source: PathName | None = None, *, text: str | None = None) -> Machine:
-    """The machine that a file, or a text in TOML, describes; raises `ConfigError` NCF3xx with all that is wrong."""
+    """The machine described by a file or a TOML text; raises `ConfigError` NCF3xx with everything that is wrong."""
     from ncfix.machine import load, loads
 
     if source is not None and text is None:
@@ -46,11 +46,11 @@ def read_program(
     dialect: Dialect | str | None = None,
     machine: Machine | None = None,
 ) -> Program:
-    """The program in a file, or in a text.
+    """The program in a file or a text.
 
-    dialect  its language; None: what the text shows, else that of the machine's control, else what the suffix shows
+    dialect  its language; None: found from the text, the machine's control or the file suffix
 
-    Raises `SourceError` NCF1xx for what cannot be read.
+    Raises `SourceError` NCF1xx for a program that cannot be read.
     """
     from ncfix.text.dialect import detect, encoded
     from ncfix.text.reader import read
@@ -68,7 +68,7 @@ def read_program(
 
 
 def as_path(source: PathName) -> str:
-    """A path; raises TypeError for a text, which has several lines, and for what is no path."""
+    """A path; raises TypeError for a text with several lines and for anything that is no path."""
     path = os.fspath(source)
     if isinstance(path, bytes) or "\n" in path:
         raise TypeError("a path is needed, and this is a text; read_program and load_machine take one as text=...")
@@ -76,7 +76,7 @@ def as_path(source: PathName) -> str:
 
 
 def as_machine(machine: Machine | PathName) -> Machine:
-    """A machine, or that of a file; raises TypeError for anything else."""
+    """A machine, given itself or as a file; raises TypeError for anything else."""
     from ncfix.machine import Machine
 
     return load_machine(machine) if isinstance(machine, (str, os.PathLike)) else _checked(machine, Machine)
@@ -89,7 +89,7 @@ def _checked(value: Any, kind: type[Value]) -> Value:
 
 
 def sound_machine(machine: Machine | PathName, force: bool) -> Machine:
-    """A machine for something to be made with it; raises `RefusedError` NCF320 to NCF324 if no machine can be so."""
+    """A machine to make something for; raises `RefusedError` NCF320 to NCF324 if it is implausible, unless `force`."""
     from ncfix.machine.plausible import required
 
     known = as_machine(machine)
@@ -100,7 +100,7 @@ def sound_machine(machine: Machine | PathName, force: bool) -> Machine:
 
 
 def as_program(program: Program | PathName, machine: Machine) -> Program:
-    """A program, or that of a file, for this machine's control if it does not show its language.
+    """A program, given itself or as a file; a file that does not show its language is read for the machine's control.
 
     Raises TypeError for anything else.
     """
@@ -112,10 +112,10 @@ def as_program(program: Program | PathName, machine: Machine) -> Program:
 
 
 def as_setup(setup: Setup | PathName | None, machine: Machine) -> Setup:
-    """A set-up, or that of a file; without one nothing is given.
+    """A setup, given itself or as a file; None: an empty one.
 
-    Raises `UsageError` NCF025 for a value that is not finite and for an axis that there is not, NCF384 for work
-    offsets in the order of the machine's axes, TypeError for what is no set-up.
+    Raises `UsageError` NCF025 for a value that is not finite or an unknown axis, NCF384 for work offsets in the order
+    of the machine's axes, TypeError for anything that is no setup.
     """
     if setup is None:
         return Setup()
@@ -131,7 +131,7 @@ def as_setup(setup: Setup | PathName | None, machine: Machine) -> Setup:
 
 
 def _check_values(setup: Setup) -> None:
-    """Refuse a set-up with a value that is no finite number, or for an axis that no machine has: NCF025."""
+    """Refuse a setup with a value that is not a finite number, or for an unknown axis: NCF025."""
     by_axis = {f"work_offsets[{name!r}]": values for name, values in setup.work_offsets.items()}
     by_axis |= {f"references[{name!r}]": values for name, values in setup.references.items()}
     by_axis |= {"initial": setup.initial, "probed": setup.probed or {}}
@@ -153,26 +153,26 @@ def _check_values(setup: Setup) -> None:
 
 
 def subprograms_of(setup: Setup, *programs: Program) -> Resolve | None:
-    """What gives the files of subprograms: beside programs that came from files, and where the setup says."""
+    """Finds subprogram files, beside programs that came from files and where the setup says; None: there are none."""
     paths = [program.path for program in programs if not program.path.startswith("<")]
     return subprograms(setup, *paths) if paths or setup.subprograms else None
 
 
 def as_names(argument: str, given: Sequence[str]) -> tuple[str, ...]:
-    """Several names; raises `UsageError` NCF025 for a single text, which would be taken for its letters."""
+    """Several names; raises `UsageError` NCF025 for a single string, which would be read letter by letter."""
     if isinstance(given, str):
         raise UsageError.of("NCF025", f"{argument}={given!r}", hint=f"{argument}=[{given!r}], a list of names")
     return tuple(given)
 
 
 def check_list(argument: str, given: str | None) -> None:
-    """Raises `UsageError` NCF025 for names that are not one text, with commas between them."""
+    """Refuse anything but one string of names separated by commas: `UsageError` NCF025."""
     if given is not None and not isinstance(given, str):
         raise UsageError.of("NCF025", f"{argument}={given!r}", hint=f"{argument}='EC0Y,E?X', one text")
 
 
 def as_measurements(measured: Measured | Sequence[Measured], machine: Machine) -> list[Measurement]:
-    """One measurement or several, or those of files; raises `UsageError` NCF020 for one twice, NCF025 for none."""
+    """One or more measurements or their files; raises `UsageError` NCF020 if one is given twice, NCF025 without any."""
     from ncfix.measure.measurement import Measurement
     from ncfix.measure.reader import read
 
@@ -187,7 +187,7 @@ def as_measurements(measured: Measured | Sequence[Measured], machine: Machine) -
 
 
 def paths_of(given: Iterable[object]) -> Iterator[str]:
-    """The paths of what is given: those of files, and of values that came from files."""
+    """The paths of the arguments: of files, and of values that were read from files."""
     for each in given:
         if isinstance(each, (str, os.PathLike)):
             yield os.fspath(each)
@@ -198,12 +198,12 @@ def paths_of(given: Iterable[object]) -> Iterator[str]:
 
 
 def check_writable(output: PathName | None, force: bool, *given: object) -> None:
-    """Refuse an output that must not be written, or is one of the inputs, before anything is computed."""
+    """Refuse an output that must not be written or is one of the inputs, before anything is computed."""
     if output is not None:
         check_target(os.fspath(output), identities(paths_of(given)), force)
 
 
 def write_output(output: PathName | None, content: bytes, force: bool) -> None:
-    """Write a result, if a path for it is given."""
+    """Write a result, if a path is given."""
     if output is not None:
         write_whole(os.fspath(output), content, force)

@@ -1,4 +1,4 @@
-"""Compensation tables, and pages on machines, diagnoses and results."""
+"""Functions for compensation tables, and reports on machines, diagnoses and results."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from ncfix.text.tree import Program
 
 SAME = 0.5
-"""mm: tools whose lengths differ by less are the same to tables."""
+"""Largest difference, mm, of tool lengths that count as equal for tables."""
 MANY = 4
-"""Lengths that are listed."""
+"""Number of tool lengths listed in a remark."""
 INSTEAD = "give the original program, or run this one without tables"
 
 
@@ -50,10 +50,10 @@ def table_request(
     complete: bool = True,
     inputs: Mapping[str, float] | None = None,
 ) -> Request:
-    """What to make tables of; ranges in mm and rad.
+    """The request for tables; ranges in mm and rad.
 
-    complete  options without a default must be given
-    inputs    what temperatures and the like are: tables follow none, and hold for these values
+    complete  whether options without a default must be given
+    inputs    temperatures and other inputs: tables cannot follow them, and hold for these values
     """
     from ncfix.machine.effects import at_inputs
     from ncfix.tables.control import Request
@@ -78,15 +78,15 @@ def export(
     output: PathName | None = None,
     force: bool = False,
 ) -> Exported:
-    """Make compensation tables for a control, read them again, and judge them by running them.
+    """Make compensation tables for a control, read them back, and evaluate them by emulation.
 
     control      its name, as in `ncfix export`
-    tool_length  the length that the tables hold for, mm
-    target_um    how much correction may be lost between the points of a table
-    ranges       axis -> what the tables cover, mm and rad; others: the travel
+    tool_length  tool length for which the tables hold, mm
+    target_um    largest correction that may be lost between the points of a table
+    ranges       axis -> range of the tables, mm and rad; default: the travel
     settings     options of the control
     program      a program to run with them, with its `setup`; for gcode, to rewrite
-    setup        its `inputs` are what the tables hold for: temperatures and the like, which no table follows
+    setup        its `inputs` (temperatures and others) are the values for which the tables hold
     output       a folder for the files
     """
     from ncfix.tables.control import get_control
@@ -116,14 +116,14 @@ def emulate(
     program: Program | PathName | None = None,
     setup: Setup | PathName | None = None,
 ) -> Exported:
-    """Say what tables leave on a machine: run them as the control would.
+    """Compute the errors that tables leave on a machine, by emulating the control.
 
-    tables         the files that `export` made, all of them, or their folder
-    other_machine  run tables that were made for another machine or other errors
-    name           what the folder is called in messages, if files are given
+    tables         all files that `export` made, or their folder
+    other_machine  accept tables that were made for another machine or other errors
+    name           name of the folder in messages, if files are given
     program        a program to run with them, with its `setup`
-    setup          its `inputs` are what temperatures and the like are; with other ones than `export` had it is another
-                   machine
+    setup          its `inputs` are temperatures and others; with inputs other than those of `export` the machine counts
+                   as another one
     """
     from ncfix.machine.effects import at_inputs
     from ncfix.tables.control import get_control
@@ -141,7 +141,7 @@ def emulate(
 def _to_run(
     program: Program | PathName, machine: Machine, setup: Setup | PathName | None
 ) -> tuple[Program, Machine, Setup, Resolve | None]:
-    """A program, the machine and the set-up that it is run with, and what finds its subprograms."""
+    """A program, the machine and the setup to run it with, and the finder of its subprograms."""
     read, own = as_program(program, machine), as_setup(setup, machine)
     return read, machine, replace(own, assume_zero=True) if machine.is_perfect else own, subprograms_of(own, read)
 
@@ -155,17 +155,16 @@ def with_program(
     resolve: Resolve | None,
     rewrite: bool = False,
 ) -> Exported:
-    """Tables, and what a control with them leaves along a program.
+    """Tables with the errors that they leave along a program.
 
-    Errors before and after are looked at where the tool cuts; those of a rewritten program are the figures of `fix`,
-    which looks at the ends of rapids too. It is remarked on if the program's tools are not of the length that the
-    tables hold for.
+    Errors before and after are sampled where the tool cuts; those of a rewritten program are the figures of `fix`,
+    which also samples the ends of rapids. A remark is added if the program uses tools of other lengths than the tables.
 
-    rewrite  add the program as `fix` rewrites it to the files of a control that has no tables; raises `RefusedError`
-             with what could not be corrected
+    rewrite  for a control without tables, add the program as rewritten by `fix` to the files; raises `RefusedError`
+             with everything that could not be corrected
 
-    Raises `RefusedError` for a program that would be corrected twice: NCF493 if it carries a stamp of ncfix, NCF438 if
-    its numbers show it.
+    Raises `RefusedError` for a program that would be corrected twice: NCF493 if it has a stamp of ncfix, NCF438 if its
+    numbers show it.
     """
     import numpy as np
 
@@ -211,9 +210,9 @@ def report(
     output: PathName | None = None,
     force: bool = False,
 ) -> bytes:
-    """Put machines, diagnoses and results (what a verb prints with --json) on one page.
+    """Put machines, diagnoses and results (as printed with --json) on one page.
 
-    form  ".html" or ".md", or that of a plugin; the suffix of `output` says more
+    form  ".html" or ".md", or the form of a plugin; overridden by the suffix of `output`
     """
     from ncfix.reports.document import Document
     from ncfix.reports.rendering import form_of

@@ -1,1 +1,1 @@
-"""Many programs: which they are, who does the work, what is done, and how to go on after a stop."""
+"""Batches of programs: finding them, working on them in parallel, recording results, resuming after a stop."""

@@ -1,9 +1,8 @@
-"""A Dask cluster as what runs the programs of a batch: `--executor dask://HOST:PORT` (the extra `cluster`).
+"""Runs the programs of a batch on a Dask cluster: `--executor dask://HOST:PORT` (the extra `cluster`).
 
-The workers read programs and write outputs themselves. So they have ncfix in the same version, see the same folders
-under the same paths, and work where the batch was started. A worker that dies gives its program to another one; what it
-may have written by then is what the other one writes. When the scheduler is gone the batch ends, and `--resume` goes on
-with it.
+Workers read programs and write outputs themselves. So they need the same version of ncfix, and the same folders under
+the same paths; they work in the folder in which the batch was started. If a worker dies, another one gets its program
+and writes the same output again. If the scheduler fails, the batch ends, and `--resume` continues it.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ from ncfix.diagnostics import UsageError
 from ncfix.version import __version__
 
 CONNECT_S = 10
-"""How long the scheduler may take to answer, at first and when it is gone for a while."""
+"""Time, s, for the scheduler to answer, at first and after it was gone."""
 LOOK_S = 0.5
-"""How often is looked whether the scheduler is still there."""
+"""Interval, s, at which the connection to the scheduler is checked."""
 Result = TypeVar("Result")
 
 
 def cluster(address: str) -> Callable[[int], Executor]:
-    """What makes executors on a cluster; raises `UsageError` NCF029 if that cannot be.
+    """A factory of executors on a cluster; raises `UsageError` NCF029 if dask is not installed.
 
     address  dask://HOST:PORT of its scheduler
     """
@@ -39,7 +38,7 @@ def cluster(address: str) -> Callable[[int], Executor]:
 
 
 class ClusterExecutor(Executor):
-    """Gives tasks to the workers of a cluster, all of them, however many are asked for."""
+    """Submits tasks to all workers of a cluster, however many are asked for."""
 
     def __init__(self, address: str, workers: int) -> None:
         self.address = address
@@ -74,7 +73,7 @@ class ClusterExecutor(Executor):
             raise UsageError.of("NCF029", text, hint="install the same on all of them")
 
     def submit(self, work: Callable[..., Result], /, *given: Any, **named: Any) -> Future[Result]:
-        """Give a task to a worker; it is broken (`BrokenExecutor`) if several died over it, or the cluster is gone."""
+        """Submit a task; its future raises `BrokenExecutor` if several workers died over it, or the cluster is gone."""
         outer: Future[Result] = Future()
         try:
             inner = self.client.submit(_there, self._folder, work, *given, pure=False, **named)
@@ -86,7 +85,7 @@ class ClusterExecutor(Executor):
         return outer
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Leave the cluster; what has not begun is not done."""
+        """Disconnect from the cluster; tasks that have not begun are dropped."""
         self._over.set()
         with self._lock:
             rest = list(self._waiting.items())
@@ -114,13 +113,13 @@ class ClusterExecutor(Executor):
         outer.set_exception(failed)
 
     def _taken(self, outer: Future[Any]) -> Any:
-        """What a task waits for, once; None if its result is not waited for any more."""
+        """The inner future of a task, returned once; None if nobody waits for its result any more."""
         with self._lock:
             inner = self._waiting.pop(outer, None)
         return inner if inner is not None and outer.set_running_or_notify_cancel() else None
 
     def _watch(self) -> None:
-        """Break what is waited for when the cluster is gone."""
+        """Fail all waiting tasks when the cluster is gone."""
         while not self._over.wait(LOOK_S):
             if self.client.status in ("closed", "closing"):
                 with self._lock:
@@ -135,7 +134,7 @@ def _version() -> str:
 
 
 def _there(folder: str, work: Callable[..., Result], *given: Any, **named: Any) -> Result:
-    """Do a task where the batch was started: its paths are counted from there."""
+    """Run a task in the folder in which the batch was started, to which its paths are relative."""
     if os.getcwd() != folder:
         os.chdir(folder)
     return work(*given, **named)

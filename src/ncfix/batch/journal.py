@@ -1,13 +1,12 @@
-"""What a batch remembers: a journal in the folder of the outputs, one line of JSON for each thing done.
+"""The journal of a batch: a file in the output folder with one line of JSON for each finished program.
 
-The journal stays when the batch is over. The next run of the same batch, with `--resume`, finds there what need not be
-done again: programs of which nothing has changed, also those that failed. What changed is done again, and its output
-takes the place of the old one, as long as that is what ncfix has written there for this program: the journal knows the
-digests of all outputs. An output that somebody has changed since, or that was made of another program of the same name,
-is never replaced, and never taken for done.
+The journal stays after the batch. The next run with `--resume` skips programs for which nothing has changed, including
+those that failed. Changed programs are done again, and their output replaces the old one if ncfix wrote that for the
+same program: the journal has the digests of all outputs. An output that was edited since, or made from another program
+of the same name, is never replaced and never counts as finished.
 
-A process can be killed at any moment. So an output is announced in the journal before it gets its name, and noted after
-it; a line that was cut off does not count, and spoils no other. While a batch runs its journal is locked.
+A process can be killed at any moment. So an output is announced in the journal before it gets its name, and recorded
+afterwards; an incomplete line is ignored and does not damage others. While a batch runs its journal is locked.
 """
 
 from __future__ import annotations
@@ -29,17 +28,17 @@ from ncfix.values import frozen
 JOURNAL = ".ncfix-journal.jsonl"
 SCHEMA = 2
 PATIENCE_S = 5.0
-"""How long the processes of a batch that was killed may hold its journal."""
+"""Time, s, for which the processes of a killed batch may still hold its journal."""
 ROOM_BYTES = 1 << 20
-"""A journal is written anew where more than this, and more than half of it, does not count any more."""
+"""A journal is rewritten if outdated lines take up more than this, and more than half of it."""
 REPORTED = frozenset({"changed", "refused", "warnings"})
-"""What is reported at least of a program that was followed to its end."""
+"""Keys that the report of a program followed to its end has at least."""
 Find = Callable[[str], bytes | None]
-"""Gives the text of a subprogram by its name."""
+"""Returns the text of a subprogram by its name."""
 
 
 def digest_of(path: str) -> str | None:
-    """The SHA-256 of a file; None if it cannot be read, or not a second time, as a pipe."""
+    """The SHA-256 of a file; None if it cannot be read, or is no ordinary file."""
     if not os.path.isfile(path):
         return None
     try:
@@ -50,7 +49,7 @@ def digest_of(path: str) -> str | None:
 
 
 def text_digest(text: bytes | Iterable[bytes] | None) -> str:
-    """The SHA-256 of a text, whole or in parts; empty for none."""
+    """The SHA-256 of a text, whole or in parts; empty for None."""
     if text is None:
         return ""
     found = hashlib.sha256()
@@ -60,7 +59,7 @@ def text_digest(text: bytes | Iterable[bytes] | None) -> str:
 
 
 class RecordingFinder:
-    """A finder of subprograms that remembers what it was asked for."""
+    """A finder of subprograms that records what was asked for."""
 
     def __init__(self, find: Find) -> None:
         self.find = find
@@ -75,16 +74,16 @@ class RecordingFinder:
 
 @frozen
 class JournalRecord:
-    """A program that is done, or that failed.
+    """A program that was finished or has failed.
 
-    name    the output, as a way down from the folder
-    source  the program's real path
-    key     what the result depends on, as a digest: the program, the machine, the set-up, the options
-    digest  of the output; empty if none was written
+    name    output, as path below the folder
+    source  real path of the program
+    key     digest of everything the result depends on: program, machine, setup, options
+    digest  digest of the output; empty if none was written
     called  subprograms that were looked for: name -> digest of their text, empty if there was none
-    entry   what was reported
-    code    the exit code
-    limits  of time and memory, which decide whether a program fails and nothing else
+    entry   report of the program
+    code    exit code
+    limits  limits of time and memory; they only decide whether a program fails
     """
 
     name: str
@@ -97,7 +96,7 @@ class JournalRecord:
     source: str = ""
 
     def holds(self, key: str, output: str, find: Find, limits: str = "") -> bool:
-        """Whether the same would come of it again, and the output is as it was written."""
+        """Whether a new run would give the same result, and the output is still as it was written."""
         if not key or key != self.key:
             return False
         if self.digest and digest_of(output) != self.digest:
@@ -108,7 +107,7 @@ class JournalRecord:
 
     @property
     def is_sound(self) -> bool:
-        """Whether it is as ncfix writes it; what somebody has changed in the journal does not count."""
+        """Whether its contents are of the kinds that ncfix writes; a record edited otherwise is ignored."""
         texts = (self.name, self.key, self.digest, self.limits, self.source)
         maps = isinstance(self.called, Mapping) and isinstance(self.entry, Mapping)
         if not (maps and isinstance(self.code, int) and all(isinstance(each, str) for each in texts)):
@@ -121,7 +120,7 @@ class JournalRecord:
 
 
 def announce(path: str, name: str, digest: str, source: str) -> None:
-    """Say in a journal that an output is about to get this content, made of the program with this real path.
+    """Announce in a journal that an output is about to get this content, made from the program with this real path.
 
     Raises `UsageError` NCF005, NCF007.
     """
@@ -129,7 +128,7 @@ def announce(path: str, name: str, digest: str, source: str) -> None:
 
 
 def _append(path: str, content: Mapping[str, Any]) -> int:
-    """Write a line, and say how long it is."""
+    """Append a line; returns its length."""
     line = "\n" + json.dumps({"schema": SCHEMA, **content})  # a line that was cut off earlier does not spoil this one
     files.append(path, line.encode())
     return len(line)
@@ -138,8 +137,8 @@ def _append(path: str, content: Mapping[str, Any]) -> int:
 class Journal:
     """The journal of a folder.
 
-    records  what is known of each output, by its name: the last word counts
-    written  what ncfix has written, or was about to, under a name: digests, and the real paths of the programs
+    records  latest record of each output, by its name
+    written  output name -> digests that ncfix has written, or announced, with the real paths of the programs
     """
 
     def __init__(self, folder: str) -> None:
@@ -153,7 +152,7 @@ class Journal:
     @classmethod
     @contextmanager
     def opened(cls, folder: str) -> Iterator[Journal]:
-        """The journal of a folder, for this process alone.
+        """Open the journal of a folder exclusively for this process.
 
         Raises `UsageError` NCF005, NCF007 if it cannot be written, NCF026 if another process works on this folder.
         """
@@ -164,16 +163,16 @@ class Journal:
             journal.tidy()
 
     def made(self, name: str, program: str) -> frozenset[str]:
-        """The digests of what ncfix has written under a name for this program; not for another of the same name."""
+        """The digests that ncfix has written under a name for this program; not those for another of the same name."""
         source = os.path.realpath(program)
         return frozenset(digest for digest, of in self.written.get(name, {}).items() if of == source)
 
     def add(self, record: JournalRecord) -> None:
-        """Note what came of a program. Raises `UsageError` NCF005, NCF007."""
+        """Record the result of a program. Raises `UsageError` NCF005, NCF007."""
         self._take(record, _append(self.path, record.as_dict()))
 
     def tidy(self) -> None:
-        """Write the journal anew without what does not count any more, if that is much."""
+        """Rewrite the journal without outdated lines, if these are many."""
         with suppress(FileNotFoundError):
             size, counting = os.path.getsize(self.path), sum(self._counting.values())
             if size > ROOM_BYTES and size > 2 * counting:
@@ -181,7 +180,7 @@ class Journal:
                 files.write_whole(self.path, lines, replace=True)
 
     def _lines(self) -> Iterator[dict[str, Any]]:
-        """All that counts."""
+        """All lines that are not outdated."""
         for name, digests in self.written.items():
             for digest, source in digests.items():
                 if name not in self.records or digest != self.records[name].digest:
@@ -216,7 +215,7 @@ class Journal:
 
 @contextmanager
 def _locked(path: str) -> Iterator[None]:
-    """Lock a file as long as this lasts; where there are no locks, it is not locked."""
+    """Context in which a file is locked; on systems without locks it is not."""
     until = monotonic() + PATIENCE_S
     while True:
         files.append(path, b"")
@@ -232,7 +231,7 @@ def _locked(path: str) -> Iterator[None]:
 
 
 def _is_free(handle: int) -> bool:
-    """Lock an open file; whether it could be, or cannot be at all."""
+    """Lock an open file; returns False if another process holds the lock."""
     try:
         import fcntl
     except ImportError:  # Windows

@@ -1,4 +1,4 @@
-"""The programs of a shop: files, what is below folders, and the files of the subprograms that they call."""
+"""Finds programs in files and folders, and the files of the subprograms that they call."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ if TYPE_CHECKING:
     from ncfix.control.setup import Setup
 
 SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc", ".spf", ".mpf")
-"""Under what a subprogram's file may go besides its name, beside the suffix of the program that calls it."""
+"""Suffixes that a subprogram's file may have, in addition to the suffix of the calling program."""
 
 TAIL_BYTES = 1 << 12
-"""The last block of a text stands in so much of its end."""
+"""Number of bytes at the end of a text in which its last block is searched for."""
 CODE = re.compile(rb"[ \t]*(?:\([^)]*\)[ \t]*)*[^%;(\s\0-\x1f]")
-"""A line with more than a comment and the mark of the tape."""
+"""A line with more than comments and a tape mark."""
 PROGRAM_END = re.compile(rb"(?i)(?:[^(;]|\([^)]*\))*?(?<![A-Z])M[ \t]*0*(?:2|30)(?![\d.])")
 
 
 @frozen
 class ProgramFile:
-    """A program, and the name under which its output is written in an output folder.
+    """A program, and the name of its output in an output folder.
 
-    path  as the user wrote it, or below the folder that the user named
-    name  the file's own name, or its way down from that folder
-    below  it is in a folder that was named, and was not named itself
+    path  as the user gave it, or below the folder that the user gave
+    name  the file's own name, or its path below that folder
+    below  whether it was found in a folder, and not given itself
     """
 
     path: str
@@ -42,7 +42,7 @@ class ProgramFile:
 
     @property
     def left_out(self) -> Message | None:
-        """Why a program that was not named itself is left out: other programs call it. None if it is not."""
+        """Why a program found in a folder is left out (it is a subprogram); None if it is not."""
         if not (self.below and is_subprogram(self.path)):
             return None
         text = "is a subprogram, and is corrected in the programs that call it, with --flatten"
@@ -50,13 +50,13 @@ class ProgramFile:
 
 
 def program_files(given: Iterable[str], apart: str | None = None) -> list[ProgramFile]:
-    """The programs that `given` names, folders with all that is below them, in the order of names.
+    """The programs given by files and folders; of a folder all that are below it, sorted by name.
 
-    apart  a folder that is left out: that of the outputs
+    apart  a folder that is left out: the output folder
 
     A file in a folder is a program if it has a suffix of a dialect. Hidden files and folders, symbolic links, pipes,
-    devices and `.orig` files are none. Raises `UsageError` NCF014 for a folder without any, `SourceError` NCF002 for
-    one that cannot be read.
+    devices and `.orig` files are not. Raises `UsageError` NCF014 for a folder without programs, `SourceError` NCF002
+    for one that cannot be read.
     """
     found: list[ProgramFile] = []
     for path in given:
@@ -83,7 +83,7 @@ def _below(folder: str, apart: str | None) -> list[ProgramFile]:
 
 
 def _files(folder: str, apart: str | None) -> Iterator[str]:
-    """The files below a folder that are not hidden, but for those below `apart`."""
+    """The files below a folder that are neither hidden nor below `apart`."""
 
     def refuse(error: OSError) -> None:
         raise files.unreadable(str(error.filename), error) from error
@@ -96,7 +96,7 @@ def _files(folder: str, apart: str | None) -> Iterator[str]:
 
 
 def is_subprogram(path: str) -> bool:
-    """Whether the last block of a text goes back to what has called it, in any dialect, and no block ends a program."""
+    """Whether the last block of a text returns to a caller, in any dialect, and no block ends a program."""
     try:
         with open(path, "rb") as handle:
             handle.seek(max(0, os.fstat(handle.fileno()).st_size - TAIL_BYTES))
@@ -111,9 +111,9 @@ def is_subprogram(path: str) -> bool:
 
 @frozen
 class SubprogramFiles:
-    """Finds the files of subprograms in folders, the first first, by their name with or without a suffix.
+    """Finds the files of subprograms in folders, in their order, by name with or without a suffix.
 
-    Where no file has the name as it is written, one is taken that has it in another case, if it is the only one.
+    If no file has exactly the name, one with the name in another case is taken if it is the only one.
     """
 
     folders: tuple[str, ...]
@@ -131,7 +131,7 @@ class SubprogramFiles:
 
 
 def file_of(folder: str, name: str) -> str:
-    """The path of a file in a folder, its name in any case; empty if there is none, or if there are several."""
+    """The path of a file in a folder, with its name in any case; empty if there is none, or more than one."""
     path = os.path.join(folder, name)
     if os.path.isfile(path):
         return path
@@ -145,7 +145,7 @@ def file_of(folder: str, name: str) -> str:
 
 @lru_cache(maxsize=8)
 def names_in(folder: str, changed: int) -> dict[str, list[str]]:
-    """What is in a folder that has changed last at a time (ns): names as they are, by names in lower case."""
+    """Name in lower case -> names, of a folder's content; `changed`: its modification time, ns, for the cache."""
     found: dict[str, list[str]] = {}
     for each in os.listdir(folder):
         found.setdefault(each.lower(), []).append(each)
@@ -153,7 +153,7 @@ def names_in(folder: str, changed: int) -> dict[str, list[str]]:
 
 
 def subprograms(setup: Setup, *paths: str) -> Callable[[str], bytes | None]:
-    """Finds the files of subprograms: beside the program and the one that it was made of, and where the setup says."""
+    """A finder of subprograms: beside the given programs, and in the folders of the setup."""
     beside = dict.fromkeys("." if path == "-" else os.path.dirname(path) or "." for path in paths)
     suffixes = dict.fromkeys((*SUBPROGRAM_SUFFIXES, *(os.path.splitext(path)[1].lower() for path in paths)))
     return SubprogramFiles((*beside, *setup.subprograms), tuple(suffixes))

@@ -1,8 +1,8 @@
-"""A folder into which programs come one by one: which of them are complete, and when it is worth looking again.
+"""Watches a folder into which programs are copied: which of them are complete, and when to look again.
 
-A program is complete when its size and its time have not changed for a while: a copy over a network writes for
-seconds, and nothing else says that it is over. What comes is noticed at once where the system says so (the extra
-`watch`), and by looking again and again where it does not, as on shares of other computers.
+A program is complete when its size and modification time have not changed for a while: a copy over a network takes
+seconds, and nothing else shows its end. Changes are noticed at once where the system reports them (the extra `watch`),
+otherwise by polling, as on network shares.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from ncfix.diagnostics import UsageError
 from ncfix.values import mutable
 
 LOOK_S = 1.0
-"""How often a folder is looked at where the system says nothing."""
+"""Polling interval, s, where the system does not report changes."""
 EVENTS_S = 0.2
-"""Changes that come within this time are one."""
+"""Time, s, within which several changes count as one."""
 
 State = tuple[int, int, int]
-"""Size, time of the last change (ns), and number of a file: what tells that it is another one."""
+"""Size, modification time (ns) and inode of a file, which change when it is rewritten or replaced."""
 
 
 def state_of(path: str) -> State | None:
@@ -39,12 +39,12 @@ def state_of(path: str) -> State | None:
 class WatchedFolder:
     """The programs of a folder, and which of them have been taken.
 
-    folder    with all that is below it
-    apart     a folder that is left out: that of the outputs
-    settle_s  a program that has not changed for so long is complete
-    clock     the time, s
-    taken     the states in which programs were taken, by their paths
-    waiting   the states of those that are not complete, and since when
+    folder    the folder, including everything below it
+    apart     a folder that is left out: the output folder
+    settle_s  time without changes, s, after which a program is complete
+    clock     returns the time, s
+    taken     path -> state in which the program was taken
+    waiting   path -> state of an incomplete program, and since when it has been in that state
     """
 
     folder: str
@@ -55,7 +55,7 @@ class WatchedFolder:
     waiting: dict[str, tuple[State, float]] = field(default_factory=dict)
 
     def complete(self) -> list[str]:
-        """The paths of programs that are complete and have not been taken in this state; now they have."""
+        """Paths of programs that are complete and not yet taken in this state; marks them as taken."""
         now, found = self.clock(), []
         states = {path: state for path in self._paths() if (state := state_of(path)) is not None}
         self.waiting = {path: since for path, since in self.waiting.items() if path in states}
@@ -71,7 +71,7 @@ class WatchedFolder:
         return found
 
     def again(self) -> None:
-        """Forget what has been taken: what programs are corrected for has changed."""
+        """Forget what was taken, because the machine or the setup has changed."""
         self.taken.clear()
 
     def _paths(self) -> Sequence[str]:
@@ -84,10 +84,10 @@ class WatchedFolder:
 
 
 def moments(folder: str, others: Sequence[str], settle_s: float, poll_s: float | None) -> Iterator[None]:
-    """When it is worth looking at a folder: at first, when something has changed, and a while after that.
+    """Yields when the folder should be looked at: at first, after changes, and for a while after them.
 
-    others  files whose changes count, too; they need not be there
-    poll_s  look so often, whatever the system says; None: as the system says, if it can
+    others  further files whose changes count; they need not exist
+    poll_s  polling interval; None: as the system reports changes, if it can
     """
     if poll_s is None and find_spec("watchfiles"):
         yield from _told(folder, others, settle_s)

@@ -1,7 +1,7 @@
-"""Who works on many programs.
+"""Works on many programs in parallel.
 
-The workers are processes of this machine, or whatever the executor of a plugin reaches. What comes out does not depend
-on that: results come in the order of the tasks, and a worker that dies takes one task with it, not the batch.
+Workers are processes of this computer, or those of a plugin's executor. The results do not depend on that: they come in
+the order of the tasks, and a worker that dies costs one task, not the batch.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 ExecutorMaker: TypeAlias = "Callable[[int], Executor]"
-"""Makes an executor with so many workers."""
+"""Makes an executor with a number of workers."""
 SCHEME = "dask://"
-"""How the name of a cluster begins."""
+"""Beginning of the name of a cluster."""
 
 
 def processes(workers: int) -> Executor:
-    """Processes of this machine; they end with this one."""
+    """An executor of processes on this computer; they end with this process."""
     from concurrent.futures import ProcessPoolExecutor
 
     return ProcessPoolExecutor(workers, initializer=tie)
@@ -37,7 +37,7 @@ BUILT_IN: Mapping[str, ExecutorMaker] = {"processes": processes}
 
 
 def executor_of(name: str) -> ExecutorMaker:
-    """The executors of that name, or on a cluster, `dask://HOST:PORT`; raises `UsageError` NCF015, NCF029."""
+    """The executor maker with a name, or for a cluster, `dask://HOST:PORT`; raises `UsageError` NCF015, NCF029."""
     if name.startswith(SCHEME):
         from ncfix.batch.cluster import cluster
 
@@ -64,8 +64,8 @@ def results_in_order(
 ) -> Iterator[Result]:
     """The results of `work` for all tasks, in their order, by `workers` workers.
 
-    lost  the result for a task whose worker died over it twice, the second time alone
-    done  is told of each result as soon as it is there, in whatever order
+    lost  makes the result of a task whose worker died twice, the second time with this task alone
+    done  called with each result as soon as it is available, in any order
     """
     from concurrent.futures import BrokenExecutor, as_completed
 

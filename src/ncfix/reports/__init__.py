@@ -1,1 +1,1 @@
-"""Results as pages and plots; nothing is computed here."""
+"""Renders results as pages and plots; computes nothing."""

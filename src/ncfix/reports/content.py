@@ -1,4 +1,4 @@
-"""Machines and results in a report: of a machine file its errors with their curves, of a result its tables."""
+"""Report content for machines (errors with their curves) and for results (their tables)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ncfix.reports.document import Line, Paragraph, Part, Plot, ReportSection, T
 WAYS = {1: "upwards", -1: "downwards", 0: ""}
 Result = Mapping[str, Any]
 MOST = 500
-"""Rows of a table that are shown."""
+"""Largest number of rows of a table that are shown."""
 HEADINGS = {
     "verdict": "Diagnosis",
     "parameters": "Calibration",
@@ -34,7 +34,7 @@ HEADINGS = {
     "error_um": "Simulation",
     "files": "Programs",
 }
-"""What a result is about, by a key that only it has."""
+"""Headings of results, by a key that only such a result has."""
 FIX = {
     "path": "program",
     "output": "written to",
@@ -43,14 +43,14 @@ FIX = {
     "inserted_blocks": "inserted",
     "max_correction_um": "largest, um",
 }
-"""Columns of what `fix` did."""
+"""Columns of the results of `fix`."""
 TERMS = {"freedom": "degrees of freedom", "chi_square": "reduced chi-square", "condition": "condition number"}
-"""Keys that people would not say so."""
+"""Readable forms of some keys."""
 FIGURES = {"error_before_um": "before", "error_after_um": "after"}
 
 
 def machine_sections(machine: Machine, path: str) -> list[ReportSection]:
-    """What there is to say of a machine file: its chain, its errors with their curves, what they do to the tool tip."""
+    """Sections on a machine: its axes, its errors with their curves, and the resulting errors of the tool tip."""
     chain = Table(("axis", "kind", "carries", "direction", "through", "travel"), [_axis(axis) for axis in machine.axes])
     about = Table((), [("file", path), ("hash", machine.hash), *facts(machine).items()])
     head = ReportSection(machine.name, [about, chain])
@@ -104,7 +104,7 @@ def _unit(effect: Effect) -> tuple[float, str]:
 
 
 def _curve_plots(machine: Machine, joint: str) -> Iterator[Plot]:
-    """The effects of a joint over the axis that each depends on, those from two sides as two curves."""
+    """The effects of a joint over the axis that each depends on; one curve for each direction of motion."""
     for effect in machine.effects:
         found = effect_curves(machine, effect) if effect.joint == joint else []
         if found:
@@ -119,7 +119,7 @@ def _curve_plots(machine: Machine, joint: str) -> Iterator[Plot]:
 
 
 def result_sections(result: Result, path: str) -> list[ReportSection]:
-    """What there is to say of a result."""
+    """The section on a result."""
     about = next((heading for key, heading in HEADINGS.items() if key in result), "Result")
     return [ReportSection(f"{about}: {path}", list(_parts(result)) or [Paragraph("Nothing.")])]
 
@@ -146,7 +146,7 @@ def _parts(result: Result) -> Iterator[Part]:
 
 
 def _is_of_calibration(result: Result) -> bool:
-    """Whether each coefficient has a name, a value, and a standard deviation unless it was held."""
+    """Whether each coefficient has a name, a value, and a standard deviation or None (held)."""
     rows = result.get("parameters")
     return _is_rows(rows) and all(
         isinstance(row.get("name"), str)
@@ -158,7 +158,7 @@ def _is_of_calibration(result: Result) -> bool:
 
 
 def _calibration(rows: Sequence[Result]) -> Iterator[Part]:
-    """The coefficients with their uncertainty, um and urad."""
+    """The coefficients with their uncertainties, um and urad."""
     cells = []
     for row in rows:
         factor, unit = (1e6, "urad") if row["name"][1:2] in ("A", "B", "C") else (1e3, "um")
@@ -174,7 +174,7 @@ def _calibration(rows: Sequence[Result]) -> Iterator[Part]:
 
 
 def is_of_fix(entry: Any) -> bool:
-    """Whether that is what `ncfix fix --json` prints of a program; files that people have changed may be anything."""
+    """Whether `entry` has the form of a program in `ncfix fix --json`; a file edited by people may be anything."""
     if not isinstance(entry, Mapping) or not isinstance(entry.get("path"), str) or "output" not in entry:
         return False
     rows = (("refused", "reason"), ("warnings", "text"), ("errors", "text"))
@@ -195,7 +195,7 @@ def is_of_fix(entry: Any) -> bool:
 
 
 def _is_said(rows: Any, text: str) -> bool:
-    """Whether these are messages, each with a code and a text."""
+    """Whether `rows` are messages, each with a code and a text."""
     return isinstance(rows, list) and all(
         isinstance(row, Mapping)
         and isinstance(row.get("code"), str)
@@ -250,7 +250,7 @@ def _limited(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[P
 
 
 def _words(key: str) -> str:
-    """A key as people would say it: `gap_um` is "gap, um"."""
+    """A key in readable form: `gap_um` is "gap, um"."""
     if key in TERMS:
         return TERMS[key]
     name, unit = (key[:-3], ", um") if key.endswith("_um") else (key, "")
@@ -258,7 +258,7 @@ def _words(key: str) -> str:
 
 
 def _cell(value: Any) -> str:
-    """A value in a few words; of long lists, how many there are."""
+    """A value in a few words; of a long list, its length."""
     if value is None:
         return ""
     if isinstance(value, bool):

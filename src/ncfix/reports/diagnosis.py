@@ -1,4 +1,4 @@
-"""A diagnosis in a report: verdict, names with their curves and rivals, residuals before and after."""
+"""Report content for a diagnosis: verdict, effects with their curves and rivals, residuals before and after."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ from ncfix.values import frozen
 
 HOUR = 3600.0
 CURVES = 4
-"""Components of an effect that are drawn."""
+"""Number of components of an effect that are drawn."""
 LEAST = 1e-99
-"""Chances below this are none."""
+"""Smallest probability that is shown as a number."""
 RUNNERS = 6
-"""Names that did not win which are shown."""
+"""Number of runners-up that are shown."""
 PLACES, ROWS_LEAST = 15, 6
-"""Places of a measured curve at most, and rows that the mean at each is made of at least."""
+"""Largest number of points of a measured curve, and smallest number of rows averaged for each."""
 MAIN = 0.5
-"""Share of the largest component from which on another is drawn, too."""
+"""Size, relative to the largest component, from which on a component is drawn."""
 EXTREME = 0.995
-"""Share of the residuals that a plot must hold; the others are drawn at its edge."""
+"""Share of residuals within the limits of a plot; the others are drawn at its edge."""
 
 
 def document(diagnosis: Diagnosis) -> Document:
@@ -93,7 +93,7 @@ def _waterfall(diagnosis: Diagnosis) -> Iterator[Part]:
 
 
 def _chances(diagnosis: Diagnosis) -> Iterator[Part]:
-    """Whether the gap is more than noise."""
+    """Whether the gap is larger than noise explains."""
     if diagnosis.p_lack is None or diagnosis.p_left is None:
         yield Paragraph(
             "Whether what is left is more than noise cannot be said: there are no repeats and no stated noise."
@@ -108,7 +108,7 @@ def _chance(p: float) -> str:
 
 
 def _moved(diagnosis: Diagnosis) -> Iterator[Part]:
-    """What the file says otherwise of where axes lie, and of gains."""
+    """Constants of the machine file (positions of axes, gains) that the data contradict."""
     if diagnosis.moved:
         yield Paragraph("Constants of the machine file that the data put elsewhere (the gap before has them there):")
         yield Table((), [(constant(each),) for each in diagnosis.moved])
@@ -141,11 +141,11 @@ def _finding(diagnosis: Diagnosis, finding: EffectFinding) -> ReportSection:
 
 @frozen(slots=False)
 class MeasuredCurve:
-    """What was measured against what a finding shows: means of neighbouring rows.
+    """Measured values compared with an effect, as means of neighbouring rows.
 
-    title      the finding, and the direction of motion where it depends on that
-    component  which measured value; `over` what x (k,) is, with its unit
-    measured   (k,) um with everything else taken off; `spread` two standard errors of it
+    title      the effect, and the direction of motion if it depends on that
+    component  the measured component; `over`: the quantity on x (k,), with its unit
+    measured   (k,) um, with all other effects removed; `spread`: two standard errors of it
     model      (k,) um, means over the same rows
     """
 
@@ -159,7 +159,7 @@ class MeasuredCurve:
 
     @property
     def plot(self) -> Plot:
-        """As a part of the report."""
+        """The curve as a plot of the report."""
         caption = (
             f"{self.title}: {self.component}, um over {self.over}, with everything else taken off; "
             "means of neighbouring rows, band: two standard errors of what was measured"
@@ -169,7 +169,7 @@ class MeasuredCurve:
 
 
 def measured_curves(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[MeasuredCurve]:
-    """Of the components in which a finding shows most, over what it depends on; each direction of motion by itself."""
+    """Curves of the components in which an effect shows most, over what it depends on, by direction of motion."""
     found = _depends_on(diagnosis, finding)
     if found is None or not finding.shown.any():
         return
@@ -195,7 +195,7 @@ def measured_curves(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Me
 
 
 def _depends_on(diagnosis: Diagnosis, finding: EffectFinding) -> tuple[str, Array] | None:
-    """What a finding depends on, with its unit, and that for each row; None where that is no axis and no clock."""
+    """What an effect depends on, with its unit, and the value in each row; None if neither an axis nor the time."""
     data = diagnosis.data
     signals = [effect.signal or "" for effect in finding.effects] + [finding.candidate.axis]
     if any(signal.startswith(("temp_", "time_s")) for signal in signals):
@@ -208,7 +208,7 @@ def _depends_on(diagnosis: Diagnosis, finding: EffectFinding) -> tuple[str, Arra
 
 
 def _ways(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[tuple[str, Mask]]:
-    """Words and rows of each direction in which the axis came, where the finding depends on that; else all rows."""
+    """Words and rows of each direction of approach, if the effect depends on that; else all rows."""
     data, axis = diagnosis.data, finding.candidate.axis
     side = data.column(f"dir_{axis}") if axis else np.zeros(data.count)
     if any(effect.basis.needs_direction for effect in finding.effects) and np.ptp(side) > 0:
@@ -219,7 +219,7 @@ def _ways(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[tuple[str, M
 
 
 def _runners(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:
-    """The names that did not win, by their evidence."""
+    """The runners-up of an effect, by their evidence."""
     runners_up = diagnosis.selected.runners_up.get(finding.candidate.name, {})
     if runners_up:
         best = sorted(runners_up, key=lambda each: -runners_up[each])[:RUNNERS]
@@ -229,7 +229,7 @@ def _runners(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:
 
 
 def _curve(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:
-    """Every component over its axis, with a band of two standard deviations; of what warms, what it shows in time."""
+    """Every component over its axis, with a band of two standard deviations; for thermal effects, also over time."""
     for effect in finding.effects[:CURVES]:
         yield from _component(diagnosis, effect)
     if any((effect.signal or "").startswith(("temp_", "time_s")) for effect in finding.effects):
@@ -271,7 +271,7 @@ def _residuals(diagnosis: Diagnosis) -> ReportSection:
 
 
 def _arrows(diagnosis: Diagnosis) -> Iterator[Part]:
-    """Residuals as arrows over each plane of linear axes, before and after, where they are shifts of the tip."""
+    """Residual tip displacements as arrows in each plane of linear axes, before and after."""
     data, names = diagnosis.data, np.array(diagnosis.data.names)
     letters = [axis.name for axis in data.measured.linear if axis.name in "XYZ"]
     for first, second in combinations(letters, 2):
@@ -287,7 +287,7 @@ def _arrows(diagnosis: Diagnosis) -> Iterator[Part]:
 
 
 def _folded(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:
-    """What a cyclic error leaves without it, over one pitch: all turns of the screw one upon the other."""
+    """The residuals without a cyclic error over one pitch, all turns of the screw superposed."""
     waves = [effect for effect in finding.effects if isinstance(effect.basis, Periodic) and effect.times is None]
     axis = diagnosis.data.machine.axis(finding.candidate.axis)
     if not waves or axis is None:
@@ -321,7 +321,7 @@ def _maps(diagnosis: Diagnosis) -> Iterator[Part]:
 
 
 def _in_time(diagnosis: Diagnosis, what: str, values: Mapping[str, Array]) -> Iterator[Part]:
-    """Values (m,) over the time at which they were measured; nothing without a clock."""
+    """Values (m,) over time; nothing if the measurement has no times."""
     time = diagnosis.data.column("time_s")
     if np.ptp(time) > 0:
         kept = diagnosis.case.kept

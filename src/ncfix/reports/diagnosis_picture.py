@@ -1,4 +1,4 @@
-"""A picture of a diagnosis for papers, by matplotlib: what each rung leaves, what was measured against the model."""
+"""A picture of a diagnosis for publications (matplotlib): what each rung leaves, and measurement against model."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from ncfix.arrays import Array
 
 PANELS = 7
-"""Curves that are drawn at most, those of the first findings."""
+"""Largest number of curves; those of the first effects are drawn."""
 MEASURED, MODEL = COLOURS["before"], COLOURS["after"]
 
 
 def picture(diagnosis: Diagnosis, form: str) -> bytes:
-    """The picture as a file of a form: svg, png or pdf. Raises `UsageError` NCF031 without matplotlib."""
+    """The picture as a file: svg, png or pdf. Raises `UsageError` NCF031 without matplotlib."""
     require_matplotlib()
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg

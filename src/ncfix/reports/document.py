@@ -1,4 +1,4 @@
-"""What a report says, whatever it looks like: sections of text, tables and plots."""
+"""The content of a report, independent of its form: sections of text, tables and plots."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Paragraph:
 
 @frozen
 class Table:
-    """Rows of cells under a header; a header of no names has none."""
+    """Rows of cells under a header; an empty header is not shown."""
 
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -28,8 +28,8 @@ class Line:
     """A curve of a plot.
 
     x, y    (n,)
-    spread  (n,) half the width of the band around it; None: no band
-    label   what it is, empty if there is only one
+    spread  (n,) half width of the band around it; None: no band
+    label   its name; empty if there is only one
     """
 
     x: Array
@@ -40,7 +40,7 @@ class Line:
 
 @frozen
 class Dots:
-    """Single values in a plot: (n,) where, (n,) how much, and what they are."""
+    """Single values of a plot: x (n,), y (n,), and their name."""
 
     x: Array
     y: Array
@@ -49,7 +49,7 @@ class Dots:
 
 @frozen
 class Plot:
-    """Curves and single values over one axis; the caption says what is up and what is across, with the units."""
+    """Curves and single values over one axis; the caption names both quantities with their units."""
 
     caption: str
     drawn: Sequence[Line | Dots]
@@ -57,7 +57,7 @@ class Plot:
 
 @frozen
 class Bars:
-    """Values that are compared, a horizontal bar each: their names, and the caption with their unit."""
+    """Values to compare as horizontal bars, with their names; the caption has the unit."""
 
     caption: str
     names: Sequence[str]
@@ -66,11 +66,11 @@ class Bars:
 
 @frozen
 class ArrowMap:
-    """Small shifts at places of a plane, a panel for each title, all to one scale.
+    """Small displacements at points of a plane; one panel for each title, all at the same scale.
 
     across, up  names of the two axes, with their units
-    x, y        (n,) places
-    shifts      title -> (n, 2), in the unit that `unit` names
+    x, y        (n,) points
+    shifts      title -> (n, 2) displacements in `unit`
     """
 
     caption: str
@@ -87,7 +87,7 @@ Part = Paragraph | Table | Plot | Bars | ArrowMap
 
 @frozen
 class ReportSection:
-    """A heading and what belongs to it."""
+    """A heading and its parts."""
 
     heading: str
     parts: Sequence[Part]

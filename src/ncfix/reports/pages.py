@@ -1,7 +1,7 @@
-"""What pages with pictures are made of: templates, scripts and style of this package, data, and plotly's library.
+"""Building blocks of HTML pages with pictures: templates, scripts and style of this package, data, plotly's library.
 
-A page holds everything it needs and asks no network for anything. Data and library are in it as gzip in base64, which
-browsers unpack by themselves. Equal input gives equal bytes.
+A page contains everything it needs and loads nothing from a network. Data and library are embedded as gzip in base64,
+which browsers can unpack. Equal input gives equal bytes.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from ncfix.arrays import Array
 from ncfix.diagnostics import UsageError
 
 OWN = b'<meta name="generator" content="ncfix '
-"""What says that a file is a page of ncfix's, which a newer one may replace."""
+"""Mark of pages made by ncfix, which a later version may replace."""
 LIBRARY = "plotly.js"
-"""Name of the library beside the pages of a batch."""
+"""File name of the library beside the pages of a batch."""
 WITHIN = 600
-"""Bytes at the beginning of a page in which OWN stands."""
+"""Number of bytes at the beginning of a page within which `OWN` must be found."""
 
 
 @cache
@@ -38,7 +38,7 @@ def asset(name: str) -> str:
 
 @cache
 def library() -> bytes:
-    """The library that draws, with its licence at its head; raises `UsageError` NCF031 where it is not installed."""
+    """The plotting library, with its licence at the beginning; raises `UsageError` NCF031 if it is not installed."""
     found = find_spec("plotly")
     if found is None or not found.submodule_search_locations:
         text = "a page of a program is drawn by plotly, which is not installed"
@@ -47,12 +47,12 @@ def library() -> bytes:
 
 
 def packed(content: bytes) -> str:
-    """Bytes as they stand in a page."""
+    """Bytes in the form in which a page embeds them."""
     return b64encode(gzip.compress(content, 9, mtime=0)).decode()
 
 
 def with_columns(head: Mapping[str, Any], columns: Mapping[str, Array]) -> bytes:
-    """Plain data and columns of numbers, as the script of the page reads them: length of the head, head, columns."""
+    """Plain data and number columns in the form that the page's script reads: length of the head, head, columns."""
     kinds = [[name, f"{values.dtype.kind}{values.dtype.itemsize}", len(values)] for name, values in columns.items()]
     text = json.dumps({**head, "columns": kinds}, ensure_ascii=False, allow_nan=False).encode()
     little = (np.ascontiguousarray(each, each.dtype.newbyteorder("<")).tobytes() for each in columns.values())
@@ -60,17 +60,17 @@ def with_columns(head: Mapping[str, Any], columns: Mapping[str, Array]) -> bytes
 
 
 def filled(template: str, values: Mapping[str, str]) -> bytes:
-    """A template of this package with values in the places of their names, which are HTML."""
+    """A template of this package with its placeholders replaced by HTML."""
     return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], asset(template)).encode()
 
 
 def card(value: str, about: str) -> str:
-    """A figure at the head of a page; `value` is HTML."""
+    """A figure at the top of a page; `value` is HTML."""
     return f'<div class="card"><b>{value}</b><span>{escape(about)}</span></div>'
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[int] = ()) -> str:
-    """A table; cells are HTML; columns `right` stand to the right."""
+    """A table; cells are HTML; columns in `right` are aligned to the right."""
     kinds = [' class="n"' if column in right else "" for column in range(len(header))]
     head = "".join(f'<th scope="col"{kind}>{escape(name)}</th>' for name, kind in zip(header, kinds, strict=True))
     body = "".join(
@@ -80,7 +80,7 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[
 
 
 def is_own(path: str) -> bool:
-    """Whether a file is a page of ncfix's, or the library of its pages."""
+    """Whether a file is a page of ncfix, or the library of such pages."""
     try:
         with open(path, "rb") as file:
             begin = file.read(WITHIN)

@@ -1,4 +1,4 @@
-"""A picture of a corrected program for papers, by matplotlib: error along the path, its distribution, and the path."""
+"""A picture of a corrected program for publications (matplotlib): error along the path, its distribution, the path."""
 
 from __future__ import annotations
 
@@ -29,29 +29,29 @@ STYLE: dict[Any, Any] = {
     "lines.linewidth": 0.9,
 }
 ERROR = ("#a9c6e6", "#6f9bd1", "#7a62b8", "#a8286f", "#5c0620")
-"""The scale of errors, as on the page: lightness goes one way."""
+"""Colour scale of errors, as on the page; its lightness is monotonic."""
 COLOURS = {"before": "#c2510a", "after": "#0b62a8"}
 DRAWN = 4000
-"""So many places are drawn at most, about."""
+"""Approximate largest number of points that are drawn."""
 STRETCHES = 1500
-"""So many points of a line are drawn at most; each is the largest of its stretch."""
+"""Largest number of points of a curve; each is the maximum of its stretch."""
 UNDATED: dict[str, dict[str, None]] = {
     "svg": {"Date": None},
     "pdf": {"CreationDate": None, "ModDate": None},
     "png": {"Software": None},
 }
-"""Equal input gives equal bytes: files have no date."""
+"""Metadata settings that leave dates out, so that equal input gives equal bytes."""
 
 
 def require_matplotlib() -> None:
-    """Raises `UsageError` NCF031 where matplotlib is not installed."""
+    """Raise `UsageError` NCF031 if matplotlib is not installed."""
     if find_spec("matplotlib") is None:
         text = "a picture is drawn by matplotlib, which is not installed"
         raise UsageError.of("NCF031", text, hint="pip install 'ncfix[plot]'")
 
 
 def picture(page: ProgramPage, form: str) -> bytes:
-    """The picture as a file of a form: the path coloured by the error before and after on one scale, and two curves."""
+    """The picture as a file: the path coloured by its error before and after on one scale, and two curves."""
     require_matplotlib()
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg

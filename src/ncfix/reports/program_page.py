@@ -1,4 +1,4 @@
-"""The page of a program: what its correction does to the path of the tool tip, as pictures, figures and lists."""
+"""The HTML page of a corrected program: pictures, figures and lists on the path of the tool tip."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from ncfix.values import mutable
 from ncfix.version import __version__
 
 WHOLE = 300_000
-"""Bytes of text up to which a page holds all of it; else the lines around those that it lists."""
+"""Largest size, bytes, of a text that a page contains completely; else it has the lines around listed places."""
 AROUND = 2
 LONGEST = 160
-"""Characters of a line that are shown."""
+"""Largest number of characters of a line that are shown."""
 NOTES = 100
-"""Remarks that are shown, the FIRST of them at once."""
+"""Largest number of remarks that are shown, the first `FIRST` of them unfolded."""
 FIRST = 3
 REFUSED = "motion blocks that stayed as they were although they are not right."
 PASSED = "blocks that may stay as they are, and why."
@@ -38,15 +38,15 @@ CURVES = (
     "standard deviations, where the file has them."
 )
 HIGH = 0.8
-"""Share of a limit from which it is shown as high."""
+"""Share of a limit from which on it is marked as high."""
 
 
 @mutable
 class ProgramPage:
-    """What a page is made of.
+    """The content of a page.
 
-    text    the program as it was
-    output  where the corrected one was written; None: nowhere
+    text    the original program
+    output  path of the corrected program; None: not written
     """
 
     record: PathRecord
@@ -59,7 +59,7 @@ class ProgramPage:
     _lines: list[bytes] = field(default_factory=list)
 
     def html(self, beside: str | None = None) -> bytes:
-        """The page; with the library in it, or, for a page of many, `beside` it: the way to its folder."""
+        """The page, with the library embedded; in a batch, `beside` is the relative path of the library's folder."""
         record, report = self.record, self.report
         self._lines, self._spots = self.text.splitlines(), []
         columns, shift, strays = record.columns()
@@ -122,7 +122,7 @@ class ProgramPage:
         )
 
     def _said(self) -> str:
-        """The remarks, the first ones at once."""
+        """The remarks, the first ones unfolded."""
         report, found = self.report, []
         if len(report.block_delete) > 1:
             found.append(
@@ -140,7 +140,7 @@ class ProgramPage:
         return "".join(said[:FIRST]) + rest
 
     def _axes(self, shift: Array) -> tuple[list[dict[str, object]], dict[str, Array]]:
-        """The axes, and their corrections at the places that are drawn: um, thousandths of a degree."""
+        """The axes, and their corrections at the places drawn: um, thousandths of a degree."""
         axes: list[dict[str, object]] = []
         columns = {}
         for axis in self._in_order():
@@ -151,7 +151,7 @@ class ProgramPage:
         return axes, columns
 
     def _in_order(self) -> list[Axis]:
-        """The axes, linear ones first, by their letters."""
+        """The axes sorted by letter, linear ones first."""
         return sorted(self.machine.axes, key=lambda axis: (axis.rotary, axis.name))
 
     def _limits(self) -> str:
@@ -202,7 +202,7 @@ class ProgramPage:
         return f"<code>{escape(self._text(line))}</code>"
 
     def _source(self) -> dict[int, str]:
-        """The lines that the page shows as text: all of a short program, else those around the places that it lists."""
+        """The lines shown as text: all lines of a short program, else those around listed places."""
         if len(self.text) <= WHOLE:
             wanted = set(range(1, len(self._lines) + 1))
         else:
@@ -230,12 +230,12 @@ def _inside() -> str:
 
 
 def _unit(rotary: bool) -> tuple[str, float]:
-    """In what corrections are shown, and how many of it make a mm or rad."""
+    """The unit in which corrections are shown, and its factor from mm or rad."""
     return ("mdeg", 1e3 * float(np.degrees(1.0))) if rotary else ("µm", 1e3)
 
 
 def _limit(name: str, found: Extent, rotary: bool, limit: float | None) -> list[str]:
-    """A row of corrections; a limit of None is that of the axes together."""
+    """A row of the table of corrections; limit None: the limit holds for the axes together."""
     unit, factor = _unit(rotary)
     low, high = (f"{factor * value + 0.0:+.2f}" if value else "0" for value in (found.low, found.high))
     line = str(found.line) if found.line else ""

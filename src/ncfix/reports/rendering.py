@@ -1,6 +1,6 @@
-"""A report as a file: one HTML page with plots as SVG that loads nothing from elsewhere, or Markdown.
+"""Renders a report as a file: one HTML page with SVG plots that loads nothing else, or Markdown.
 
-The suffix of the file says which; plugins bring further forms.
+The suffix of the file selects the form; plugins can add forms.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from ncfix.reports.document import ArrowMap, Bars, Document, Dots, Line, Paragra
 
 WIDTH, HEIGHT = 520, 190
 LEFT, RIGHT, TOP, BOTTOM = 52, 12, 10, 24
-"""Pixels round the axes, for the numbers."""
+"""Margins around the axes, pixels, for the numbers."""
 NAMES, VALUES, BAR = 150, 60, 24
-"""Pixels for the names and the values of bars, and from one bar to the next."""
+"""Pixels for names and for values of bars, and from bar to bar."""
 PANEL, EDGE, LONGEST = 300, 44, 40.0
-"""Pixels of a map of arrows, of its edge, and of the longest arrow."""
+"""Pixels: size of an arrow map, of its margin, and of the longest arrow."""
 ACROSS, UP = 7, 5
-"""Ticks that there are about."""
+"""Approximate numbers of ticks."""
 ROUND = (1.0, 2.0, 5.0, 10.0)
 COLOURS = ("#2c6fb5", "#b5452c", "#3f8f3f", "#7a4fa0")
 NUMBER = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?")
-"""Cells that stand to the right under their header."""
+"""Cells that are aligned to the right under their header."""
 STYLE = (
     "body{font:15px/1.45 sans-serif;max-width:74em;margin:2em auto;padding:0 1em;color:#222}"
     "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.2em .8em;border-bottom:1px solid #ccc;text-align:left}"
@@ -43,11 +43,11 @@ STYLE = (
     "@media print{section{break-inside:avoid}}"
 )
 Rendering = Callable[[Document], bytes]
-"""Makes a file's content of a report."""
+"""Renders a report as the content of a file."""
 
 
 def form_of(path: str) -> Rendering:
-    """The form that a file's suffix stands for; raises `UsageError` NCF018. Without a suffix, HTML."""
+    """The form for the suffix of a file (without suffix: HTML); raises `UsageError` NCF018."""
     suffix = os.path.splitext(path)[1].lower() or ".html"
     known: dict[str, Rendering] = registry("reporters", {".html": html, ".md": markdown})
     if suffix not in known:
@@ -56,7 +56,7 @@ def form_of(path: str) -> Rendering:
 
 
 def html(document: Document) -> bytes:
-    """The page, UTF-8."""
+    """The report as an HTML page, UTF-8."""
     title = escape(document.title)
     body = "\n".join(
         f"<section><h2>{escape(section.heading)}</h2>\n" + "\n".join(map(_html_part, section.parts)) + "</section>"
@@ -102,7 +102,7 @@ def html_plot(plot: Plot) -> str:
 
 
 def _html_bars(bars: Bars) -> str:
-    """One bar below the other, with its name before it and its value behind it."""
+    """Horizontal bars below each other, with names on the left and values on the right."""
     longest = max([0.0, *bars.values]) or 1.0
     room = WIDTH - NAMES - VALUES
     drawn = []
@@ -119,7 +119,7 @@ def _html_bars(bars: Bars) -> str:
 
 
 def _html_arrows(part: ArrowMap) -> str:
-    """A square panel for each title; the longest arrow of all is `LONGEST` pixels."""
+    """A square panel for each title; the longest arrow of all has `LONGEST` pixels."""
     inner, scale = PANEL - 2 * EDGE, LONGEST / (max(map(_longest, part.shifts.values())) or 1.0)
     wide = max(float(np.ptp(part.x)), float(np.ptp(part.y))) or 1.0
     x = EDGE + inner / 2 + inner * (part.x - (part.x.max() + part.x.min()) / 2) / wide
@@ -169,7 +169,7 @@ def _legend(drawn: Sequence[Line | Dots]) -> str:
 
 
 def markdown(document: Document) -> bytes:
-    """The text, UTF-8; of plots the extremes."""
+    """The report as Markdown text, UTF-8; of plots only the extremes."""
     lines = [f"# {_escaped(document.title)}"]
     for section in document.sections:
         lines += [f"\n## {_escaped(section.heading)}\n", *(f"{_markdown_part(part)}\n" for part in section.parts)]
@@ -200,28 +200,28 @@ def _extremes(what: Line | Dots) -> str:
 
 
 def _escaped(text: str) -> str:
-    """Text that means nothing else in Markdown."""
+    """Text with the special characters of Markdown escaped."""
     for mark in "\\`*_[]<>|#":
         text = text.replace(mark, f"\\{mark}")
     return text
 
 
 class PlotAxes:
-    """A plot's axes: what is across and what is up."""
+    """The axes of a plot: ranges across and up."""
 
     def __init__(self, across: tuple[float, float], up: tuple[float, float]) -> None:
         self.across, self.up = across, up
 
     @classmethod
     def around(cls, drawn: Sequence[Line | Dots]) -> PlotAxes:
-        """Axes that hold everything, lines with their bands, and zero."""
+        """Axes that include all data with their bands, and zero."""
         x = np.concatenate([each.x for each in drawn])
         edges = np.concatenate([edge for each in drawn for edge in _edges(each)])
         up = min(0.0, float(edges.min())), max(0.0, float(edges.max()))
         return cls((float(x.min()), float(x.max())), up)
 
     def points(self, x: Array, y: Array) -> str:
-        """Places as SVG has them."""
+        """Points in the form of SVG."""
         return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(self._x(x).tolist(), self._y(y).tolist(), strict=True))
 
     def _x(self, x: Array) -> Array:
@@ -250,7 +250,7 @@ class PlotAxes:
 
 
 def ticks(low: float, high: float, count: int) -> Array:
-    """Round numbers from low to high, about so many; of a range without width its only value."""
+    """About `count` round numbers from low to high; for an empty range, its only value."""
     if not high > low:
         return np.array([low])
     rough = (high - low) / count

@@ -1,8 +1,8 @@
-"""What the tests of a plugin ask: does its language, its control with tables, or a strategy keep the contract?
+"""Contract tests for plugins: for a language, a control with tables, or a strategy.
 
 `check_language(dialect)`, `check_control(control)` and `check_strategy(strategy)` raise AssertionError with the first
-things that are wrong, each with the program, the table or the pose that shows it. They cannot know what the manual
-says: `check_places(dialect, program, places)` compares where a program leads with what you state.
+violations, each with the program, table or pose that shows it. They do not know the control's manual:
+`check_places(dialect, program, places)` compares the positions in a program with those that you state.
 """
 
 from ncfix.testing.judging import check_places

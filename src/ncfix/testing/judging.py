@@ -1,7 +1,7 @@
-"""What became of each line of a short program, judged by reading the result again.
+"""Judges what became of each line of a short program by reading the result again.
 
-The machine is off by a constant shift, so a block that is corrected ends exactly by that much beside where it ended
-before, in whatever frame it is written; a block that is passed or refused keeps its bytes.
+The machine has a constant error, so a corrected block must end displaced by exactly that much, in whatever frame it is
+written; a passed or refused block keeps its bytes.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from ncfix.text.stamp import find
 from ncfix.values import frozen
 
 SHIFT = {"X": -0.0124, "Y": 0.0213, "Z": 0.0085}
-"""mm, added to commands: minus the errors of the machine."""
+"""Correction, mm, added to commands: minus the errors of the machine."""
 STEP = 0.0011
-"""mm: a word is right to its last digit."""
+"""Tolerance, mm, of a corrected word: its last digit."""
 CLOSE = 1e-4
-"""mm, degrees: a position that a test states is right to the digits that people write."""
+"""Tolerance, mm and degrees, of a position stated in a test."""
 
 AXIS = """
 [axis.{0}]
@@ -54,7 +54,7 @@ SETUP = Setup(
 
 
 def shifted_machine(share: float = 1.0) -> Machine:
-    """Three axes, each off by its share of the shift."""
+    """A machine with three axes, each with its share of the constant error."""
     text = 'name = "shifted"\ntopology = "w F X Y Z t"\n' + "".join(
         AXIS.format(axis, direction, -SHIFT[axis] * share) for axis, direction in LINEAR
     )
@@ -68,13 +68,13 @@ def check_places(
     setup: Setup = SETUP,
     machine: Machine | None = None,
 ) -> None:
-    """Raise AssertionError where a program is not followed as the manual has it.
+    """Raise AssertionError if a program is not followed as stated.
 
-    places   line -> axis -> where it stands behind that line, in machine coordinates, mm and degrees, behind a hole at
-             its bottom; under tool-centre-point control and in a tilted plane X Y Z are the tip's on the workpiece.
-             None for a line whose motions are refused, or at which the program stops
+    places   line -> axis -> position after that line, in machine coordinates, mm and degrees; of a hole, at its bottom;
+             under tool-centre-point control and in a tilted plane, X Y Z of the tip on the workpiece. None for a line
+             whose motions are refused, or at which the program stops
     setup    as `Statements.setup`: G54 has no offset, and tool n is 20 n mm long
-    machine  one with X, Y and Z if not given
+    machine  default: a machine with X, Y and Z
     """
     dialect = get(dialect) if isinstance(dialect, str) else dialect
     machine = shifted_machine() if machine is None else machine
@@ -99,12 +99,12 @@ def check_places(
 
 @frozen
 class Judged:
-    """What became of a program.
+    """The fate of a program.
 
-    lines    line -> "right", "passed", "refused", or what is wrong with it; lines without a motion are not in it
-    stopped  the line at which the program stops, with the message; None if it does not
+    lines    line -> "right", "passed", "refused", or what is wrong with it; only lines with motions
+    stopped  line at which the program stops, with the message; None if it does not
     text     the corrected program
-    places   line -> where it led as programmed, commands of all axes, mm and rad
+    places   line -> programmed end position, commands of all axes, mm and rad
     """
 
     lines: dict[int, str]
@@ -114,18 +114,18 @@ class Judged:
 
     @property
     def wrong(self) -> dict[int, str]:
-        """The lines that are neither right, nor passed by a rule, nor refused."""
+        """Lines that are neither right, nor passed by a rule, nor refused."""
         return {line: what for line, what in self.lines.items() if what not in ("right", "passed", "refused")}
 
 
 def judged(
     lines: Sequence[str], dialect: Dialect, machine: Machine, setup: Setup = SETUP, skipped: bool | None = None
 ) -> Judged:
-    """Correct a program of one block a line and look at every line of it.
+    """Correct a program with one block per line and judge every line.
 
-    skipped  how the switch of block delete stands when the result is looked at; None: nothing is known of it
+    skipped  position of block delete when the result is read; None: not given
 
-    Raises whatever is raised that has no code.
+    Raises every exception that has no code.
     """
     source = "".join(f"{line}\n" for line in lines).encode("latin-1")
     known = setup if skipped is None else replace(setup, block_skip=skipped)
@@ -144,7 +144,7 @@ def judged(
 
 
 def _by_line(lines: Sequence[str], fixed: Fixed, before: Moves, after: Moves) -> dict[int, str]:
-    """Motion by motion: the tolerance is so wide that none is split; blocks that are put in have none."""
+    """Motion by motion: the tolerance is so wide that no motion is split, and inserted blocks have no motions."""
     new = fixed.text.decode("latin-1").splitlines()
     rows, others = (np.flatnonzero(moves.kind != MotionKind.DWELL) for moves in (before, after))
     if len(rows) != len(others):
@@ -169,7 +169,7 @@ def _by_line(lines: Sequence[str], fixed: Fixed, before: Moves, after: Moves) ->
 
 
 def _shift(moves: Moves, fixed: Fixed, block: int) -> np.typing.NDArray[np.float64]:
-    """By how much the motions of a block shall be moved: not along axes that are said to be left where they stand."""
+    """The expected displacement of a block's motions; NaN along axes that the report lists as left where they are."""
     line = block + 1
     left = {each.axis for each in fixed.report.left if any(low <= line <= high for low, high in each.stretches)}
     return np.array([np.nan if axis in left else SHIFT.get(axis, 0.0) for axis in moves.axes])

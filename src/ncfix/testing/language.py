@@ -1,8 +1,8 @@
-"""The contract that any language must pass: `check_language(dialect)` in the tests of its plugin.
+"""The contract for languages: `check_language(dialect)` in the tests of a plugin.
 
-Programs are put together from what the language writes (`Statements`), corrected for a machine whose error is known,
-and read again. What is looked for in every line: it is a motion that is right, it passes by a rule, or it is refused
-with a reason. Nothing that leads somewhere is passed over in silence, and nothing fails without a message.
+Programs are composed from what the language writes (`Statements`), corrected for a machine with a known error, and read
+again. Every line must be a correct motion, pass by a rule, or be refused with a reason. Nothing that demands a motion
+may be ignored silently, and nothing may fail without a message.
 """
 
 from __future__ import annotations
@@ -37,22 +37,22 @@ NUMBERS: dict[str, float] = {
     "1234.5678": 1234.5678,
     "0.0124": 0.0124,
 }
-"""Ways to write a number in G code, with what they mean."""
+"""Forms of numbers in G code, with their values."""
 WORDS_AT_ONCE = 4
 SIZES = (0, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4)
-"""How many words a block has that is put together at random."""
+"""Numbers of words of random blocks."""
 READ_AGAIN = 12
-"""Blocks at random that are read after others."""
+"""Number of random blocks that are read after others."""
 TOLD = 5
-"""Faults that are told, of all that are found."""
+"""Largest number of violations that are reported."""
 
 Leads = Callable[[str, Sequence[str], int], bool]
-"""(head, words, index of the mode) -> whether the manual says that the block moves axes, or that the control stops."""
+"""(head, words, index of the mode) -> whether the block must move axes or stop the control, according to the manual."""
 
 
 @frozen
 class Pair:
-    """What puts something in force, and what ends it: a line each, or several."""
+    """Lines that put something in force, and lines that end it."""
 
     on: tuple[str, ...] = ()
     off: tuple[str, ...] = ()
@@ -63,23 +63,23 @@ NOTHING = Pair()
 
 @frozen
 class Statements:
-    """How a language writes what `check_language` puts together; a block a line.
+    """The statements of a language from which `check_language` composes programs; one block per line.
 
-    begin     before everything: all axes are brought to places, absolute, with tool, feed and work offset
-    end       after everything: the first block names X, Y and Z absolutely; the last ends the program
-    heads     what a block may begin with: codes, or nothing
-    words     what may stand behind; of words with the same address a block has one
+    begin     start of every program: positions all axes with absolute words; tool, feed and work offset
+    end       end of every program: its first block names X, Y and Z absolutely, its last one ends the program
+    heads     beginnings of a block: codes, or nothing
+    words     words that may follow; a block has at most one word of each address
     modes     lines before the statement that put another motion code or cycle in force
     leads     see `Leads`
     frames    rotations, tilted planes, shifts, with their ends
-    offsets   cutter compensation on, with a motion, and off
-    cycles    lines that drill holes, with what ends the cycle
+    offsets   cutter compensation switched on with a motion, and off
+    cycles    lines that drill holes, with the end of the cycle
     places    lines in machine coordinates and to reference points
-    motions   plain motions, absolute
+    motions   simple motions, absolute
     number    a motion with `{}` for a number of X
-    numbers   how numbers may be written, with what they mean
-    skip      the sign of block delete; empty where the language has none
-    unknown   lines of which the language has none like them, without axis words
+    numbers   forms of numbers, with their values
+    skip      the sign of block delete; empty if the language has none
+    unknown   lines unknown to the language, without axis words
     setup     offsets and tools that the programs use
     """
 
@@ -102,14 +102,14 @@ class Statements:
 
 
 TAKES = ("G4", "G92", "G52", "G10 L2 P1", "G43", "G17", "G90", "G40", "M3")
-"""What takes the words of its block for itself, or has no use for them."""
+"""Codes that use the words of their block themselves, or for which these have no meaning."""
 FRAME_CODES = ("G22", "G50.1", "G51", "G51.1", "G68", "G68.2", "G68.3", "G68.4")
-"""What else does so: a code of a dialect's own may be like one of these."""
+"""Further codes of that kind; a dialect's own code may be like one of them."""
 REFERENCE = ("G28", "G30")
 
 
 def gcode_leads(head: str, words: Sequence[str], mode: int) -> bool:
-    """Axis words lead somewhere unless a code takes them; arcs about a centre need none."""
+    """Whether a block demands a motion: axis words do, unless a code uses them; arcs with a centre need none."""
     if head in REFERENCE:
         return True
     if head in TAKES or head in FRAME_CODES:
@@ -119,7 +119,7 @@ def gcode_leads(head: str, words: Sequence[str], mode: int) -> bool:
 
 
 def gcode_statements(dialect: Dialect) -> Statements:
-    """The statements of a dialect of G code (RS274, Fanuc and their like), with the codes and cycles of its own."""
+    """The statements of a dialect of G code (RS274, Fanuc and similar), with its own codes and cycles."""
     own = tuple(code for code, _ in dialect.codes)
     alike = {code: each.code for code, operations in dialect.codes for each in operations if isinstance(each, Like)}
     drills = {code: f"{code} X10. Y20. Z-5. {table.level}2." for code, table in dialect.cycles}
@@ -160,7 +160,7 @@ def gcode_statements(dialect: Dialect) -> Statements:
 
 @frozen
 class Sample:
-    """A program; `statement`: the line of the block that is asked for, `leads`: it must not come to nothing."""
+    """A program; `statement`: line number of the tested block; `leads`: whether it must not remain without effect."""
 
     lines: tuple[str, ...]
     statement: int = 0
@@ -171,16 +171,16 @@ class Sample:
 def check_language(
     dialect: Dialect | str, statements: Statements | None = None, count: int = 60, seed: int = 1
 ) -> dict[str, int]:
-    """Raise AssertionError where a language breaks the contract; what became of the lines of all programs, counted.
+    """Raise AssertionError if a language violates the contract; returns the counts of the fates of all lines.
 
-    statements  how it writes things; None: it is a dialect of G code, see `gcode_statements`
-    count       programs at random of each sort; 0: all there are, which takes long
+    statements  how the language writes things; None: for a dialect of G code, see `gcode_statements`
+    count       number of random programs of each kind; 0: all of them, which takes long
 
-    Bytes are kept: a program is what it was read from; a machine with no error to speak of changes nothing; comments
-    stay and mean nothing; numbers mean what they say however they are written; what the language does not know is not
-    passed over, nor a word or a code that it does; a block means the same whatever was read before it. Every statement
-    with every subset of its words, behind every mode, with block delete on and off; and frames, cutter compensation,
-    cycles and machine coordinates across one another: each line is right, passed by a rule, or refused.
+    Checks: A program's bytes are kept. A machine with negligible error changes nothing. Comments stay and have no
+    effect. Numbers have the same meaning in every form. Neither unknown lines nor known words and codes are ignored. A
+    block is read the same whatever was read before. Every statement with subsets of its words, in every mode, with
+    block delete on and off, and combinations of frames, cutter compensation, cycles and machine coordinates: each line
+    is right, passed by a rule, or refused.
     """
     dialect = get(dialect) if isinstance(dialect, str) else dialect
     sample = gcode_statements(dialect) if statements is None else statements
@@ -210,7 +210,7 @@ def check_language(
 
 
 def look(each: Sample, dialect: Dialect, machine: Machine, setup: Setup, found: dict[str, int]) -> list[str]:
-    """What is wrong with the result of one program; counts what became of its lines."""
+    """Violations in the result of one program; counts the fates of its lines."""
     try:
         result = judged(each.lines, dialect, machine, setup, each.skipped)
     except Exception as error:
@@ -222,7 +222,7 @@ def look(each: Sample, dialect: Dialect, machine: Machine, setup: Setup, found: 
 
 
 def wrongs(each: Sample, result: Judged) -> Iterator[str]:
-    """What is wrong with a program."""
+    """Violations in the result of a program."""
     if result.stopped is not None:
         if each.statement and result.stopped[0] < each.statement:
             yield f"stops before the statement: {result.stopped[1]}"
@@ -234,7 +234,7 @@ def wrongs(each: Sample, result: Judged) -> Iterator[str]:
 
 
 def told(each: Sample, why: str) -> str:
-    """A fault with its program."""
+    """A violation with its program."""
     return f"{why}\n-- program:\n" + "\n".join(each.lines)
 
 
@@ -242,7 +242,7 @@ def told(each: Sample, why: str) -> str:
 
 
 def check_bytes(dialect: Dialect, sample: Statements) -> None:
-    """Whatever is not corrected stays as it is, byte for byte."""
+    """Check that everything that is not corrected stays unchanged, byte for byte."""
     lines = (*sample.begin, *sample.motions, *sample.end)
     remark = dialect.comment.format("G0 X999 WORDS")
     for end, between in product(("\n", "\r\n"), ("", f" {remark}")):
@@ -267,7 +267,7 @@ def _remarked(lines: Sequence[str], remark: str) -> tuple[str, ...]:
 
 
 def check_numbers(dialect: Dialect, sample: Statements) -> None:
-    """Numbers mean what they say in every way of writing, and what is written for them is right."""
+    """Check that numbers have the same meaning in every form, and are written correctly."""
     line, places = len(sample.begin) + 1, {}
     for text, value in sample.numbers.items():
         lines = (*sample.begin, sample.number.format(text), *sample.end)
@@ -281,7 +281,7 @@ def check_numbers(dialect: Dialect, sample: Statements) -> None:
 
 
 def check_unknown(dialect: Dialect, sample: Statements) -> None:
-    """Behind a line that the language does not know nothing is corrected, and no part of a known one is passed over."""
+    """Check that nothing is corrected after an unknown line, and that no part of a known one is ignored."""
     machine, line = shifted_machine(), len(sample.begin) + 1
     for text in sample.unknown:
         result = judged((*sample.begin, text, *sample.motions, *sample.end), dialect, machine, sample.setup)
@@ -298,11 +298,11 @@ def check_unknown(dialect: Dialect, sample: Statements) -> None:
 
 WRITTEN = re.compile(r"[-+]?(?:\d+[.,]?\d*|[.,]\d+)")
 RESPELLED = ("5", "+5", "-5.", " 5.5", " +5", " - 5", "+ 5", "-\t5", ".5", "05.0", "- .5", "  7")
-"""What is put where a block has a number; not all of it is right in each language."""
+"""Texts put in place of a block's numbers; not all of them are valid in each language."""
 
 
 def check_order(dialect: Dialect, sample: Statements, blocks: Iterable[str], chosen: random.Random) -> None:
-    """A block is read as the same, or cannot be read, whatever was read before it."""
+    """Check that a block is read the same, or cannot be read, whatever was read before it."""
     for block in blocks:
         texts = [block, *(WRITTEN.sub(lambda _: chosen.choice(RESPELLED), block) for _ in RESPELLED)]
         alone = []
@@ -319,7 +319,7 @@ def check_order(dialect: Dialect, sample: Statements, blocks: Iterable[str], cho
 
 
 def _read_block(dialect: Dialect, sample: Statements, text: str) -> tuple[object, ...]:
-    """What a block is read as: its items and the places of its numbers, or the code of the error."""
+    """The result of reading a block: its items, and the places and values of its numbers; or the code of the error."""
     lines = (sample.begin[0], text, sample.end[-1])
     try:
         program = read("\n".join(lines).encode("latin-1"), "part", dialect)
@@ -336,24 +336,24 @@ Block = tuple[int, str, tuple[str, ...]]
 
 
 def address(word: str) -> str:
-    """What a word says: its axis or address, as increment or not; `I1=` is one, `X10` says X."""
+    """The address of a word, absolute or incremental: `X` for `X10`; `I1` for `I1=`."""
     found = re.match(r"(?:I(?=[A-Z]))?([A-Z]+(?:\d(?==))?(?:\[.\])?)", word)
     return found[1] if found else word
 
 
 def agree(words: Sequence[str]) -> bool:
-    """Whether words may stand in one block: no two have the same address."""
+    """Whether words may stand in one block: no two with the same address."""
     return len({address(word) for word in words}) == len(words)
 
 
 def every_block(modes: int, heads: Sequence[str], words: Sequence[str]) -> Iterator[Block]:
-    """Every head with every subset of the words, behind every mode."""
+    """Every head with every subset of the words, in every mode."""
     for mode, head, size in product(range(modes), heads, range(WORDS_AT_ONCE + 1)):
         yield from ((mode, head, some) for some in combinations(words, size) if agree(some))
 
 
 def _blocks(sample: Statements, count: int, chosen: random.Random) -> Iterator[Block]:
-    """So many blocks at random: any head, with any subset of the words, behind any mode; all for none."""
+    """`count` random blocks: any head, any subset of the words, any mode; all such blocks if `count` is 0."""
     if not count:
         yield from every_block(len(sample.modes), sample.heads, sample.words)
     while count:
@@ -371,7 +371,7 @@ def _statements(sample: Statements, blocks: Iterable[Block]) -> Iterator[Sample]
 
 
 def _deletable(sample: Statements, blocks: Iterable[Block]) -> Iterator[Sample]:
-    """Blocks behind the sign of block delete, whichever way its switch stands."""
+    """Blocks with the sign of block delete, for both positions of its switch."""
     for mode, head, words in blocks if sample.skip else ():
         before = (*sample.begin, *sample.modes[mode])
         block = f"{sample.skip}{' '.join((head, *words)).strip()}"
@@ -380,7 +380,7 @@ def _deletable(sample: Statements, blocks: Iterable[Block]) -> Iterator[Sample]:
 
 
 def _crosses(sample: Statements) -> Iterator[Sample]:
-    """Frames, compensation, cycles and machine coordinates across one another."""
+    """Combinations of frames, compensation, cycles and machine coordinates."""
     frames, offsets, cycles = ((NOTHING, *each) for each in (sample.frames, sample.offsets, sample.cycles))
     for frame, offset, cycle, place in product(frames, offsets, cycles, ("", *sample.places)):
         for motion in sample.motions:

@@ -1,4 +1,4 @@
-"""The contract that any strategy must pass: `check_strategy(strategy)`."""
+"""The contract for strategies: `check_strategy(strategy)`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NEAR_UM = 0.01
 
 
 def five_axes(scale: float = 1.0) -> Machine:
-    """A five-axis machine with some errors of linear and of rotary axes, each `scale` times its size."""
+    """A five-axis machine with some errors of linear and rotary axes, scaled by `scale`."""
     text = FIVE_AXES
     for name, size in EFFECTS:
         text += f'\n[[effect]]\nname = "{name}"\nbasis = "polynomial"\ndegree = [1, 2]\nscale = 200\n'
@@ -40,15 +40,15 @@ def five_axes(scale: float = 1.0) -> Machine:
 
 
 def check_strategy(strategy: Strategy | str, approximate: bool = False) -> None:
-    """Raise AssertionError where a strategy breaks the contract.
+    """Raise AssertionError if a strategy violates the contract.
 
-    A perfect machine is not corrected; the same poses give the same commands, and each pose the same whatever stands
-    beside it; what is given is not changed; rotary axes keep their values unless it corrects orientations; errors half
-    as large leave a correction half as large, nearly; the corrected command brings the tip where a perfect machine
-    brings it.
+    Checks: A perfect machine is not corrected. The same poses give the same commands, and each pose the same alone and
+    among others. Arguments are not changed. Rotary axes keep their values unless the strategy corrects orientations.
+    Half the errors give about half the correction. The corrected command moves the tip to where a perfect machine moves
+    it.
 
-    approximate  the strategy leaves more than 0.01 um, but not more than a fifth of the error, or what it does to a
-                 pose depends on those before it
+    approximate  the strategy may leave more than 0.01 um, but not more than a fifth of the error, and its correction of
+                 a pose may depend on the poses before it
     """
     strategy = get_strategy(strategy) if isinstance(strategy, str) else strategy
     machine, name = five_axes(), strategy.name

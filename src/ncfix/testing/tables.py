@@ -1,6 +1,6 @@
-"""The contract that any plugin with compensation tables must pass: `check_control(control)` in its tests.
+"""The contract for controls with compensation tables: `check_control(control)` in the tests of a plugin.
 
-It makes tables for small machines with single known errors, and judges them by what the plugin reads back.
+It makes tables for small machines with single known errors, and evaluates them as the plugin reads them back.
 """
 
 from __future__ import annotations
@@ -47,15 +47,15 @@ axis.C = { type = "rotary", direction = [0, 0, 1], point = [0, 0, 0], range = [-
 """Two rotary axes that carry the workpiece."""
 
 CHAINS = {"w F X Y Z t": 1, "w X F Y Z t": -1, "w Y X F Z t": -1}
-"""Three-axis chains, with the direction in which the body of X moves: on the tool side and on the workpiece side."""
+"""Three-axis chains, and the direction of X's body: X on the tool side and on the workpiece side."""
 POSES = 400
-"""Random poses at which is looked what the tables of the contract leave."""
+"""Number of random poses at which the remaining errors are computed."""
 QUANTA = 1.5
-"""What a straight error may leave: half a step of the file's values at each of two nodes, and their positions."""
+"""Largest rest of a straight error, in steps of the file's values: half a step at two nodes, and their positions."""
 ROUNDED = 1.01
-"""Share of an error that may be left of one that the tables do not reach, since they round what else they take off."""
+"""Largest rest of an error that the tables cannot correct, relative to it; rounding of other entries adds to it."""
 DAMAGED = 12
-"""Lines of each file that are made unreadable, one at a time."""
+"""Number of lines of each file that are made unreadable, one at a time."""
 UNREADABLE = b"1.0 ?? unreadable"
 
 
@@ -66,24 +66,24 @@ def single_error(effect: str, size: float = 0.01, topology: str = "w F X Y Z t")
 
 
 def _rotary_error(effect: str) -> Machine:
-    """A machine with tables B and C and an angular error of one, 1e-4 rad at 200 degrees."""
+    """A machine with rotary tables B and C, and an angular error of one of them, 1e-4 rad at 200 degrees."""
     axes = AXES.format(name=f"only {effect}", topology="w C B F X Y Z t", sense=1)
     return loads(axes + TABLES + EFFECT.format(effect=effect, size=1e-4, half=0.5e-4))
 
 
 def _play() -> Machine:
-    """A three-axis machine with play of X, 10 um."""
+    """A three-axis machine with 10 um play of X."""
     return loads(AXES.format(name="play", topology="w F X Y Z t", sense=1) + PLAY)
 
 
 def check_control(control: Control, settings: Mapping[str, str] | None = None, tool_length: float = 100.0) -> None:
-    """Raise AssertionError where a control breaks the contract.
+    """Raise AssertionError if a control violates the contract.
 
-    What is written can be read; the same request gives the same bytes; the linter has nothing to say of fresh files;
-    the positioning error of each linear axis, on either side of the chain, goes down to a fifth at least, where a wrong
-    sign would double it; a straight error is gone but for the steps of the file's values (`Properties.quantum`); no
-    other single error of any axis is made worse, of a rotary axis neither, nor is play; a line that cannot be read is
-    objected to by `lint` or `read`, unless nothing depends on it; an option that is not there is refused.
+    Checks: Written files can be read. The same request gives the same bytes. The linter has no objection to fresh
+    files. The positioning error of each linear axis, on either side of the chain, is reduced to a fifth or less (a
+    wrong sign would double it). A straight error is removed except for the steps of the file's values
+    (`Properties.quantum`). No other single error of an axis, rotary axes included, is made worse, nor is play. An
+    unreadable line is rejected by `lint` or `read`, unless it makes no difference. An unknown option is refused.
     """
     chosen = control.settings(settings or {})
     for topology in CHAINS:
@@ -114,7 +114,7 @@ def _check_straight(control: Control, settings: Mapping[str, str], tool_length: 
 
 
 def _check_damage(control: Control, request: Request) -> None:
-    """A line that cannot be read is not passed over."""
+    """Check that an unreadable line is not ignored."""
     made = _export(control, request)
     names, q, ways = request.machine.axis_names, random_poses(request.space, POSES), random_ways(3, POSES)
     meant = control.read(made.native).at(names, q, ways)
@@ -151,7 +151,7 @@ def _request(machine: Machine, settings: Mapping[str, str], tool_length: float) 
 
 
 def _export(control: Control, request: Request) -> Exported:
-    """The files with what they leave; a refusal is a fault of the control's."""
+    """The files with the errors that they leave; a refusal violates the contract."""
     try:
         return export(control, request, POSES)
     except RefusedError as error:
@@ -159,7 +159,7 @@ def _export(control: Control, request: Request) -> Exported:
 
 
 def _residual(control: Control, machine: Machine, settings: Mapping[str, str], tool_length: float) -> float:
-    """The rms error with the tables, as a share of that without."""
+    """The rms error with the tables, relative to that without."""
     request = _request(machine, settings, tool_length)
     made = _export(control, request)
     if machine.name == "only EXX":
