@@ -1,4 +1,4 @@
-"""Motions and a machine meet here: corrected motions, the text that says them, and the proof of both."""
+"""The correction of programs for a machine's errors: planning, writing, and proof by simulation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ class FixOptions:
     force          correct a program that carries a stamp
     split_rapids   hold the tolerance along rapids too, not only at their ends
     flatten        write the program out flat where blocks are executed from several states (`driver.fix_flat`)
-    block_numbers  of blocks that are put in, in languages that number all: "same", "none", or "renumber" for all anew
+    block_numbers  numbers of inserted blocks, in languages that number every block: "same" as the block that is split,
+                   "none", or "renumber" all blocks
     verify         simulate the written program along the whole path (before and after figures)
 
     Raises `UsageError` NCF025.
@@ -37,5 +38,5 @@ class FixOptions:
 
     @property
     def tolerance_mm(self) -> float:
-        """The tolerance in the internal unit."""
+        """The tolerance, mm."""
         return self.tolerance_um * 1e-3

@@ -1,7 +1,7 @@
-"""What a correction would change, before anything is written: as lines of text, and as motions with their reasons.
+"""Preview of a correction, before anything is written: changed lines of text, and changed motions with their reasons.
 
-The text is a unified diff, in which the old and the new form of a line stand together. The motions are commands of the
-machine's axes at the ends of motions, before and after, and which errors of the machine move the tool tip most there.
+The text is a unified diff, in which the old and the new form of a line stand together. For each motion, the commands of
+the axes at its end are given before and after, with the errors of the machine that move the tool tip most there.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ if TYPE_CHECKING:
     from ncfix.text.tree import Program
 
 CONTEXT = 3
-"""Lines round a change that a diff shows."""
+"""Number of unchanged lines before and after a change in a diff."""
 MOST_NAMED = 3
-"""So many errors are named as the reason of a correction."""
+"""Largest number of errors that are named as reasons of a correction."""
 LEAST_SHARE = 0.05
-"""None is named that moves the tip by less than this part of what the largest does."""
+"""Least effect of an error that is named, as a part of that of the largest error."""
 
 
 @frozen
 class MotionChange:
     """The command of an axis at the end of a motion, before and after.
 
-    line           of the program
+    line           line of the program
     before, after  mm, or degrees of a rotary axis, in machine coordinates; under tool-centre-point control X Y Z of
                    the tip
     change         um, or thousandths of a degree
-    pieces         into how many blocks the motion is split
-    why            the errors that move the tip most there, um
+    pieces         number of blocks into which the motion is split
+    why            name of an error -> motion of the tip by it there, um; the largest ones
     """
 
     line: int
@@ -59,17 +59,17 @@ class MotionChange:
 
     @property
     def reason(self) -> str:
-        """Why, in words."""
+        """The reasons in words."""
         named = ", ".join(f"{name} {size:.1f} um" for name, size in self.why.items())
         return f"{named}; in {self.pieces} pieces" if self.pieces > 1 else named
 
 
 @frozen
 class Changes:
-    """What a correction changes.
+    """The changes that a correction makes.
 
-    fixed    the result
-    machine  with the workpiece in its place
+    fixed    the corrected program
+    machine  the machine with the workpiece at its place
     """
 
     fixed: Fixed
@@ -79,13 +79,13 @@ class Changes:
     def of(
         cls, program: Program, machine: Machine, setup: Setup, options: FixOptions, resolve: Resolve | None
     ) -> Changes:
-        """Correct a program, and keep how; raises what `fix_program` does."""
+        """Correct a program; raises what `fix_program`, or with `flatten` `fix_flat`, raises."""
         fix = fix_flat if options.flatten else fix_program
         fixed = fix(program, machine, setup, options, resolve)
         return cls(fixed, machine if fixed.made is None else with_workpiece(machine, setup))
 
     def unified(self, original: bytes, before: str, after: str) -> Iterator[bytes]:
-        """The lines of a unified diff of the text that was given; nothing if nothing changes."""
+        """The lines of a unified diff from the original text to the corrected one; none if nothing changes."""
         text, made = self.fixed.text, self.fixed.made
         if made is None or text == original:
             return
@@ -100,7 +100,7 @@ class Changes:
             yield from (_ended(line) for number, line in enumerate(found) if number > 1)
 
     def motions(self) -> Iterator[MotionChange]:
-        """The commands that change, motion after motion, axis after axis."""
+        """The commands that change, by motion and axis."""
         made = self.fixed.made
         if made is None:
             return
@@ -120,7 +120,7 @@ class Changes:
                 yield MotionChange(int(lines[row]), *found, int(pieces[row]), why[at])
 
     def _reasons(self, moves: Moves, rows: Index) -> Sequence[Mapping[str, float]]:
-        """The largest errors of the tip at the ends of motions `rows`, um, by the names of effects."""
+        """For each of motions `rows` (k,): name of an effect -> tip error by it at the end, um; the largest ones."""
         length = np.nan_to_num(picked(moves.tool_length, rows))
         q, _ = reached_joints(self.machine, picked(moves.end, rows), moves.tcp[rows], length)
         state = State(length, signs(picked(moves.end - moves.start, rows)))
@@ -140,7 +140,7 @@ class Changes:
 
 
 def as_plain(changes: Sequence[MotionChange]) -> list[dict[str, Any]]:
-    """Changes as plain data, for JSON: mm and um, degrees and thousandths of them."""
+    """Changes as plain data, for JSON: mm and um, or degrees and thousandths of a degree."""
     return [
         {
             "line": each.line,
@@ -156,7 +156,7 @@ def as_plain(changes: Sequence[MotionChange]) -> list[dict[str, Any]]:
 
 
 def _replaced(source: bytes, edits: Splices) -> Iterator[tuple[int, int, list[bytes]]]:
-    """Stretches of lines (from, up to), counted from 0, and the lines that stand there instead."""
+    """(first, stop, new lines) of each stretch of changed lines; lines are counted from 0, `stop` is excluded."""
     lines = source.splitlines(keepends=True)
     begins = np.append(0, np.cumsum([len(line) for line in lines]))
     found: list[tuple[int, int, list[Edit]]] = []

@@ -1,7 +1,7 @@
-"""Looking at a program without writing it: what the control or a correction would stumble over.
+"""Checks of a program without writing it: problems for the control, and for a correction.
 
-A long program is looked at while it is read, in bounded memory. What a correction would refuse comes from correcting
-it; nothing is written.
+A long program is checked while it is read, in bounded memory. The refusals of a correction are found by correcting the
+program; nothing is written.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from ncfix.text.tree import Program
 from ncfix.values import frozen, mutable
 
 SUSPECTED = "NCF438"
-"""A program that seems to have been corrected: what nobody needs to guess of one that says so."""
+"""Code of the suspicion that a program was corrected before; not reported for a program with a stamp."""
 OPTIONS = FixOptions(force=True, verify=False)
-"""What is asked for of the correction that tells what it would refuse."""
+"""Options of the trial correction that shows what would be refused."""
 
 
 @frozen
 class Checked:
-    """What was looked at, and what was found."""
+    """The size of the checked program, and the findings."""
 
     blocks: int
     moves: int
@@ -51,9 +51,9 @@ class Checked:
 def check_alone(
     program: Program, setup: Setup, axes: tuple[str, ...], rotary: frozenset[str], resolve: Resolve | None = None
 ) -> Checked:
-    """Check a program without a machine: can it be followed, was it corrected before, what could not be corrected.
+    """Check a program without a machine: can it be followed, does it carry a stamp, which motions cannot be corrected.
 
-    What the setup does not give is no finding. Raises what `trace` raises.
+    A value that the setup does not give is no finding. Raises what `trace` raises.
     """
     return _checked(program, positions_of(setup, lambda own: trace(program, own, axes, rotary, resolve)), Survey())
 
@@ -61,11 +61,11 @@ def check_alone(
 def check_on(
     program: Program, machine: Machine, setup: Setup, resolve: Resolve | None = None, flatten: bool = False
 ) -> Checked:
-    """Check a program on a machine: besides, does it stay within the travel, and what would its correction refuse.
+    """Check a program on a machine: also, does it stay within the travel, and what would its correction refuse.
 
-    flatten  it may be written out flat
+    flatten  the program may be written out flat for the correction
 
-    Raises what `fix_program` and `fix_flat` raise, but for a stamp, which is a finding here.
+    Raises what `fix_program` and `fix_flat` raise, except NCF430: a stamp is a finding here.
     """
     positions = positions_of(setup, lambda own: follow(program, machine, own, resolve).trace)
     fix = fix_flat if flatten else fix_program
@@ -74,7 +74,7 @@ def check_on(
 
 
 def survey_alone(parts: Parts, found: Iterable[Part]) -> Checked:
-    """As `check_alone`, of the parts of a program; raises what following does, and `NotInPartsError`."""
+    """Like `check_alone`, for the parts of a program; raises what following raises, and `NotInPartsError`."""
     survey = Survey()
     for part in found:
         survey.look(part)
@@ -82,7 +82,7 @@ def survey_alone(parts: Parts, found: Iterable[Part]) -> Checked:
 
 
 def survey_on(task: Task, read: Read) -> Checked:
-    """As `check_on`, of the text that is read; raises what correcting does, and `NotInPartsError`."""
+    """Like `check_on`, for the text that `read` returns; raises what correcting raises, and `NotInPartsError`."""
     if task.machine.is_perfect:
         parts = MachineParts.of(task, read)
         survey = Survey(parts.set_up)
@@ -102,12 +102,13 @@ def survey_on(task: Task, read: Read) -> Checked:
 
 @mutable
 class Survey:
-    """What has been found in a program, or in its parts so far.
+    """The findings about a program, or about its parts so far.
 
-    machine  with the workpiece in its place; None: nothing is asked of the travel
-    stamp    the one that it carries
-    refused  motions that must not be changed and are not right, one message per block
-    travel   motions that leave the travel as they are programmed
+    machine  the machine with the workpiece at its place; None: the travel is not checked
+    moves    number of motions
+    stamp    the message that the program carries a stamp, if it does
+    refused  motions that would need a correction but must not be changed, one message per block
+    travel   motions that leave the travel as programmed
     """
 
     machine: Machine | None = None
@@ -117,7 +118,7 @@ class Survey:
     travel: Notes = field(default_factory=Notes)
 
     def look(self, part: Part, position: int = 0) -> None:
-        """Take in the next part, or the whole program in a position of block delete."""
+        """Check the next part, or the whole program in one position of block delete."""
         program, moves = part.program, part.moves
         self.moves += len(moves)
         found = None if self.stamp else stamp.find(program)
@@ -136,7 +137,7 @@ class Survey:
                 self.travel.add(finding, program, moves, position=position)
 
     def checked(self, blocks: int, remarks: Iterable[Message]) -> Checked:
-        """All findings: nothing is told twice, and of a program that carries a stamp nobody needs to guess."""
+        """All findings, `remarks` included, without duplicates, and without a suspicion if the program has a stamp."""
         remarks = [message for message in remarks if not (self.stamp and message.code == SUSPECTED)]
         told = {(message.code, message.place and message.place.line) for message in remarks}
         travel = (each for each in self.travel.messages() if (each.code, each.place and each.place.line) not in told)
@@ -146,7 +147,7 @@ class Survey:
 def _checked(
     program: Program, positions: Sequence[SwitchSetting], survey: Survey, report: FixReport | None = None
 ) -> Checked:
-    """What is found in a program, in all positions of block delete; what was assumed is no finding."""
+    """The findings about a program in all positions of block delete; a value assumed as zero is no finding."""
     for k, position in enumerate(positions):
         survey.look(Part(program, position.trace.moves, True), k)
     survey.moves = max(len(each.trace.moves) for each in positions)
@@ -158,7 +159,7 @@ def _checked(
 
 
 def _surveyed(parts: Parts, survey: Survey, report: FixReport | None = None) -> Checked:
-    """What was found in parts, also of what a correction says, else of what there is to say of following them."""
+    """The findings about the parts of a program, with the remarks of a correction or, without one, of following."""
     parts.check_behind()
     follower = parts.follower
     said = (*follower.messages[len(follower.assumed) :], *survey.refused)
@@ -166,8 +167,8 @@ def _surveyed(parts: Parts, survey: Survey, report: FixReport | None = None) -> 
 
 
 def _remarks_of(report: FixReport) -> tuple[Message, ...]:
-    """What a correction would say and refuse, but for axes that stay where they stand and do not cut, and that the
-    program is written out flat, which was asked for.
+    """The warnings and refusals of a correction. Left out are axes that were left where they stand in motions that do
+    not cut, and the note that the program is written out flat, which was requested.
     """
     harmless = said_of((left for left in report.left if not left.cuts), report.path)
     said = (each for each in report.warnings if each.code != WRITTEN_FLAT and each not in harmless)

@@ -1,9 +1,8 @@
-"""Parts of plain motions as text, and their tip errors before and after: mostly from what is known of their ends.
+"""The text of parts of plain motions, and their tip errors before and after the correction.
 
-What the tip is off at an end was found when the end was corrected, and what is left is what the numbers that were
-written differ from those that were meant (see `written.Known`). Motions over which the error may bend are looked at
-inside, too, in the places at which `deviation` would look; the few that are made of pieces, or pass a kink, it looks at
-itself.
+The tip error at the end of a motion is known from its correction; the error that is left is the difference between
+written and meant commands (see `written.Known`). Motions over which the error may bend are sampled inside too, at the
+same places as in `deviation`. The few motions that are split, or pass a kink, are sampled by `deviation` itself.
 """
 
 from __future__ import annotations
@@ -28,10 +27,10 @@ from ncfix.writer.pieces import Pieces
 
 
 def written(language: WrittenLanguage, plan: PlainPlan, position: Array, steps: Array) -> Emission | None:
-    """Write a part; None if any of it cannot be written, or would not move.
+    """Write a part; None if a block cannot be written, or a piece would not move.
 
-    position  (n_axes,) the command at which the control stands
-    steps     (n_axes,) what the control can resolve, mm and rad
+    position  (n_axes,) the command at which the control stands before the part
+    steps     (n_axes,) least increments of the control, mm and rad
     """
     program, moves, pieces = plan.part.program, plan.part.moves, plan.pieces
     bulk = Bulk.among(language, program, moves, pieces, plan.first, plan.plain)
@@ -49,7 +48,7 @@ def largest_shift(plan: PlainPlan, emission: Emission) -> float:
 
 
 def figures(plan: PlainPlan, text: Emission, rapids: bool) -> PathError:
-    """Tip errors over the motions that cut, and over rapids if the tolerance holds along them."""
+    """Tip errors along the motions that cut and, with `rapids`, along rapids."""
     moves, written = plan.part.moves, replace(plan.real, start=text.start, end=plan.last(text.end))
     shown = (moves.kind != MotionKind.DWELL) & (rapids | (moves.kind != MotionKind.RAPID))
     check_start = plan.check_start
@@ -71,9 +70,10 @@ def figures(plan: PlainPlan, text: Emission, rapids: bool) -> PathError:
 
 
 def _at_ends(plan: PlainPlan, text: Emission, written: Segments, masks: tuple[Mask, Mask], tally: FigureTally) -> Index:
-    """Count the errors at the ends of motions that are shown, and not apart; at how many places inside to look, (n,).
+    """Add the errors at the ends of motions to the tally, and return (n,) the number of samples inside each motion.
 
-    Those at the end of which the error is not known are put apart.
+    masks  `shown` (n,): the motions to count; `apart` (n,): motions to leave out, because `deviation` samples them.
+           Motions whose error at the end is not known are added to `apart`.
     """
     from ncfix.core import motions
 
@@ -118,7 +118,7 @@ def _at_ends(plan: PlainPlan, text: Emission, written: Segments, masks: tuple[Ma
 
 
 def _inside(plan: PlainPlan, written: Segments, rows: Index, counts: Index) -> PathSamples:
-    """The errors inside of motions `rows` (k,), at `counts` (k,) places each."""
+    """The errors inside motions `rows` (k,), at `counts` (k,) even samples each."""
     intent, move, fraction = plan.intent, np.repeat(rows, counts), even(counts)
     chord = (picked(written.end, rows) - picked(written.start, rows))[:, ~intent.machine.rotary]
     weight = np.repeat(lengths(chord) / (counts + 1), counts)

@@ -1,4 +1,4 @@
-"""The machine floor: kinematic chain, error effects, machine file. Units mm and rad; frames in docs/conventions.md."""
+"""Machines with errors: kinematic chain, effects, machine files. Units mm and rad; frames in docs/conventions.md."""
 
 from ncfix.machine.axes import Axis, Effect, GaugeLine
 from ncfix.machine.file import load, loads

@@ -1,7 +1,7 @@
-"""Where the tool tip of a machine with errors is beside where it shall be, and the linear axes that bring it there.
+"""The gap between actual and intended tool tip, and the linear axis positions that bring the tip to a point.
 
-They are found by Newton's method on the exact model. The derivative is that of the machine without small motions: they
-change it by parts in ten thousand only, so each pass gains about as many digits.
+The positions are found by Newton's method on the exact model. The derivative is that of the machine without errors:
+these change it by parts in ten thousand only, so each pass gains about four digits.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from ncfix.machine.steps import SMALL, dot, has_arrived, volume
 from ncfix.values import frozen
 
 Tips = Callable[[Poses, Turns], tuple[Array, Array]]
-"""Poses with their sines -> the tip (3, n), and the largest squared angle of a small motion (n,)."""
+"""(poses, sines) -> the tip (3, n), and the largest squared angle of a small motion (n,)."""
 Vector = Sequence[float | Array]
-"""Along x, y, z: columns (n,), or numbers where all poses have the same."""
+"""Components x, y, z: columns (n,), or one number that is valid for all poses."""
 
 CLOSE = 1e-6
-"""mm; a tip that is expected to be closer to its target than 1 nm has arrived. A kink of an error between two passes
-may leave some nanometres."""
+"""Expected distance, mm, below which a tip has arrived at its target: 1 nm. A kink of an error between two passes may
+leave some nanometres."""
 FLAT = 1e-6
-"""The volume spanned by the tip's motions per mm of X, Y and Z below which they do not reach every point."""
+"""Volume spanned by the motions of the tip per mm of X, Y and Z below which they do not reach every point."""
 PASSES = 40
 WHOLE_STEPS = 8
-"""After so many passes the steps are halved: whole steps jump to and fro where the error has a jump or a kink."""
+"""Number of passes after which the steps are halved: whole steps oscillate at a jump or a kink of the error."""
 
 
 @frozen
 class Aim:
-    """Where the axes have to be, in columns.
+    """Positions of three linear axes that bring the tip to its target, in columns.
 
-    place    (3, n) of the linear axes, mm; where it began if they cannot bring the tip there
-    arrived  (n,) the tip is where it should be, to 1 nm, beside a kink of an error to some nanometres
-    off      (n,) mm: how far off the tip was where it began
+    place    (3, n) positions of the linear axes, mm; the start positions if they cannot bring the tip there
+    arrived  (n,) the tip is at its target, to 1 nm; near a kink of an error, to some nanometres
+    off      (n,) distance of the tip from its target at the start positions, mm
     """
 
     place: Array
@@ -48,11 +48,11 @@ class Aim:
 
     @classmethod
     def of(cls, n: int) -> Aim:
-        """Room for n poses."""
+        """An uninitialised result for n poses."""
         return cls(np.empty((3, n)), np.empty(n, dtype=np.bool_), np.empty(n))
 
     def put(self, rows: slice | Index, other: Aim) -> None:
-        """Put in some poses."""
+        """Write the result of some poses."""
         self.place[:, rows], self.arrived[rows], self.off[rows] = other.place, other.arrived, other.off
 
 
@@ -65,14 +65,14 @@ def aimed(
     goal: Array,
     passes: int = PASSES,
 ) -> tuple[Aim, Array]:
-    """Move three linear axes until the tip is at `goal` (3, n).
+    """Move three linear axes until the tip is at `goal` (3, n), mm.
 
     axes   the columns of X, Y and Z
     turns  sines and versines of the rotary axes, which do not change
     tips   the tip of the machine with errors
-    ways   how the tip follows each of the axes without them, mm per mm
+    ways   derivative of the tip by each of the axes on the machine without errors, mm per mm
 
-    Also the largest squared angle of a small motion that was met with (n,).
+    Also (n,) the largest squared angle of a small motion in any pass, rad^2.
     """
     with np.errstate(all="ignore"):
         whole, *normals = volume(*([np.atleast_1d(part) for part in way] for way in ways))
@@ -105,11 +105,12 @@ def aimed(
 
 
 def aimed_ahead(poses: Poses, perfect: Route, split: SplitRoute, target: Array | None) -> tuple[Aim, Index]:
-    """Move three linear axes until the tip is at `target` (3, n); None: where a perfect machine has it.
+    """Move three linear axes until the tip is at `target` (3, n), mm; None: the tip of a perfect machine.
 
-    What they do not change is undone once, ahead of all passes; so only the rest is gone through in each.
+    The steps of the route that these axes do not change are undone once, before all passes, so that each pass goes
+    through the other steps only.
 
-    Also the poses that it is not for: they need more passes, or small motions are large.
+    Also the numbers of the poses for which this is not sufficient: they need more passes, or have large small motions.
     """
     within, turns = split.within, split.within.turns(poses)
     if core.engaged() and poses.positions.shape[1] > 1:
@@ -123,7 +124,7 @@ def aimed_ahead(poses: Poses, perfect: Route, split: SplitRoute, target: Array |
 
 
 def _compiled(poses: Poses, perfect: Route, split: SplitRoute, turns: Turns, target: Array | None) -> tuple[Aim, Array]:
-    """By compiled loops; also the largest squared angle of a small motion (n,)."""
+    """`aimed_ahead` by compiled loops; also (n,) the largest squared angle of a small motion, rad^2."""
     from ncfix.core import aim
 
     within, behind = split.within, split.behind
@@ -137,15 +138,15 @@ def _compiled(poses: Poses, perfect: Route, split: SplitRoute, turns: Turns, tar
 
 
 RouteTips = Callable[[Route | None, Poses, Turns | None], Array]
-"""The tip (3, n) by a route, or by the chain without one; sines and versines, if they are known."""
+"""(route; None: the chain, poses, sines and versines if known) -> the tip (3, n), mm."""
 
 
 def gaps(
     perfect: Route, route: Route | None, tips: RouteTips, meant: Poses, done: Sequence[Poses], target: Array | None
 ) -> list[Array]:
-    """Where the tip is with the axes at each of `done` by a route, minus `target` (n, 3): (n, 3) mm each.
+    """For each of `done`: (n, 3) the tip with the axes there, by `route`, minus `target` (n, 3), mm.
 
-    target  where a perfect machine has the tip as `meant`, if not given
+    target  None: the tip of a perfect machine at `meant`
     """
     found = [np.empty((meant.positions.shape[1], 3)) for _ in done]
     for part, goal in meant.chunks():
@@ -173,7 +174,7 @@ def _gaps(
 def _compiled_gaps(
     perfect: Route, route: Route, meant: Poses, done: Sequence[Poses], target: Array | None
 ) -> tuple[Array, Array]:
-    """As `_gaps`, (k, n, 3), compiled; and the largest squared angles of small motions that were met with, (k, n)."""
+    """(k, n, 3) like `_gaps`, compiled; and (k, n) the largest squared angles of small motions, rad^2."""
     from ncfix.core import chain
 
     kinds = [meant, *(each for each in done if each is not meant)]

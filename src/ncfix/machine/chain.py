@@ -1,11 +1,11 @@
-"""The exact chain of nominal motions and error motions out to the tool tip, many poses at a time.
+"""The exact kinematic chain of nominal motions and error motions from the tool to the workpiece, many poses at a time.
 
 Each joint moves its body by B = Lc L E M(q + offset) inverse(L), in base coordinates with all axes at zero: M nominal
 motion, E error motion, L location errors of the axis line, Lc location errors that carry the body (`carried`). The
 tool branch is the product of its joints from the foundation outward, then the spindle; so is the workpiece branch.
 
-What is carried are columns (3, m, n): m points or directions, n poses. `weight` tells them apart: 1 for a point, 0 for
-a direction, shape () or (m, 1). A pose is carried as four columns, three directions and an origin; a tool tip as one.
+The chain carries columns (3, m, n): m points or directions at n poses. `weight`, shape () or (m, 1), is 1 for a point
+and 0 for a direction. A pose is carried as four columns, three directions and an origin; a tool tip as one.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ncfix.values import frozen
 Weight = float | Array
 
 SMALL = 0.08
-"""rad; rotation vectors with such components are left to the power series, which is exact there."""
+"""Largest component of a rotation vector, rad, for which the power series is exact."""
 
 
 def columns(*vectors: Sequence[float]) -> Array:
@@ -47,7 +47,7 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def advance(axis: Axis, position: Array, moved: Array, weight: Weight = 1.0) -> Array:
-    """What is carried, after the axis went to `position` (n,): the nominal motion M."""
+    """The columns after the nominal motion M of the axis to `position` (n,), mm or rad."""
     direction = np.asarray(axis.direction)
     if not axis.rotary:
         return moved + direction[:, None, None] * position * weight if np.any(weight) else moved
@@ -65,19 +65,19 @@ def advance(axis: Axis, position: Array, moved: Array, weight: Weight = 1.0) -> 
 
 
 def _is_many(moved: Array) -> bool:
-    """Whether the compiled core is to take it: columns for each of many poses."""
+    """Whether the columns are for many poses, so that the compiled core is used."""
     return core.engaged() and moved.shape[2] > 1 and moved.flags.c_contiguous
 
 
 def _weights(moved: Array, weight: Weight) -> Array:
-    """The weight of each column, (m,)."""
+    """(m,) the weight of each column."""
     return np.broadcast_to(np.asarray(weight, dtype=np.float64).reshape(-1), moved.shape[1:2]).copy()
 
 
 def turn(angle: Array) -> tuple[Array, Array]:
-    """Sine and versine (1 - cosine) of angles, to some 1e-16; the versine without loss of digits for small ones.
+    """Sine and versine (1 - cosine) of angles, accurate to about 1e-16; the versine without loss of digits if small.
 
-    By the tangent of half the angle: one function for both, and one that numpy works out eight at a time where it can.
+    Both come from the tangent of half the angle, which numpy can evaluate eight at a time.
     """
     half = np.tan(angle / 2)
     sine: Array = 2 * half / (1 + half * half)
@@ -85,7 +85,7 @@ def turn(angle: Array) -> tuple[Array, Array]:
 
 
 def cross_with(direction: Sequence[float], arm: Array) -> Array:
-    """The vector product of a constant direction, often one of the base axes, and arms (3, ...)."""
+    """The vector products of a constant direction, often a base axis, with arms (3, ...)."""
     x, y, z = direction
     out = np.empty_like(arm)
     for place, (first, second) in enumerate(((y, z), (z, x), (x, y))):
@@ -101,7 +101,7 @@ def cross_with(direction: Sequence[float], arm: Array) -> Array:
 
 @frozen
 class SmallMotion:
-    """A proper rigid motion near the identity: a rotation about `center`, then a translation. None is none.
+    """A rigid motion near the identity: a rotation about `center`, then a translation; None: without that part.
 
     rotation     (3, 1, n) rotation vector, rad
     translation  (3, 1, n) mm
@@ -113,7 +113,7 @@ class SmallMotion:
     center: Array
 
     def forth(self, moved: Array, weight: Weight = 1.0) -> Array:
-        """Carry with it."""
+        """The columns after this motion."""
         if (found := self._compiled(moved, weight, forwards=True)) is not None:
             return found
         if self.rotation is not None:
@@ -121,7 +121,7 @@ class SmallMotion:
         return moved if self.translation is None else moved + self.translation * weight
 
     def back(self, moved: Array, weight: Weight = 1.0) -> Array:
-        """Undo it."""
+        """The columns after the inverse of this motion."""
         if (found := self._compiled(moved, weight, forwards=False)) is not None:
             return found
         if self.translation is not None:
@@ -129,7 +129,7 @@ class SmallMotion:
         return moved if self.rotation is None else _turned(-self.rotation, self.center, moved, weight)
 
     def _compiled(self, moved: Array, weight: Weight, forwards: bool) -> Array | None:
-        """The motion done by the compiled core; None unless rotation and translation differ from pose to pose."""
+        """The columns moved by the compiled core; None unless rotation and translation differ from pose to pose."""
         rotation, translation = self.rotation, self.translation
         if rotation is None or translation is None or not _is_many(moved):
             return None
@@ -144,7 +144,7 @@ class SmallMotion:
 
 
 def _turned(vector: Array, center: Array, moved: Array, weight: Weight) -> Array:
-    """What is carried, after a small rotation about a center."""
+    """The columns after a small rotation `vector` about a centre."""
     if vector.size == 3 and center.size == 3 and _is_many(moved):
         from ncfix.core import points
 
@@ -156,7 +156,7 @@ def _turned(vector: Array, center: Array, moved: Array, weight: Weight) -> Array
 
 
 def rotated_by(vector: Array, arm: Array) -> Array:
-    """By how much a rotation vector (3, ...) moves the end of an arm (3, ...): (R - 1) arm, to all digits if small."""
+    """(R - 1) arm: the motion of the end of an arm (3, ...) by a rotation vector (3, ...), without loss of digits."""
     first, second = se3.rotation_factors((vector * vector).sum(0))
     once = cross(vector, arm)
     return first * once + second * cross(vector, once)
@@ -165,8 +165,8 @@ def rotated_by(vector: Array, arm: Array) -> Array:
 def composed(motions: Sequence[tuple[Array, Array]], rotates: bool) -> SmallMotion:
     """One small motion from several about different reference points: (small motion (6, n), reference (3, 1, n)) each.
 
-    The sum is taken of translations, of rotation vectors and of the velocities that the rotations cause, and its
-    exponential is the motion: with one reference point it is exactly a rotation about that point.
+    Translations, rotation vectors, and the velocities that the rotations cause are summed, and the exponential of the
+    sum is the motion. With one reference point it is exactly a rotation about that point and a translation.
     """
     values, center = motions[0]
     translation, rotation = values[:3, None], values[3:, None]
@@ -184,7 +184,7 @@ def composed(motions: Sequence[tuple[Array, Array]], rotates: bool) -> SmallMoti
 
 
 def _integrated(vector: Array, velocity: Array) -> Array:
-    """The translation of the screw with this rotation vector and velocity of the center."""
+    """The translation of the screw with this rotation vector and velocity of the centre."""
     squared = (vector * vector).sum(0)
     second, third = se3.rotation_factors(squared)[1], se3.screw_factor(squared)
     once = cross(vector, velocity)
@@ -193,12 +193,12 @@ def _integrated(vector: Array, velocity: Array) -> Array:
 
 FRAME_AXES = columns((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 OF_FRAME = np.array([0.0, 0.0, 0.0, 1.0])[:, None]
-"""Weights of the columns of a frame: three directions, which translations leave alone, and a point."""
+"""Weights of the columns of a frame: three directions, which translations do not change, and a point."""
 
 
 @frozen
 class JointModel:
-    """A joint with the slots of its small motions; the spindle has no axis."""
+    """A joint with the slots of its small motions, by kind; `rotating`: those with angles. The spindle has no axis."""
 
     axis: Axis | None
     motion: tuple[Slot, ...] = ()
@@ -207,7 +207,7 @@ class JointModel:
     rotating: frozenset[Slot] = frozenset()
 
     def at(self, position: Array, small: Mapping[Slot, Array]) -> JointPose:
-        """The joint at a position (n,), with the small motions worked out for these poses."""
+        """The joint at axis positions (n,), mm or rad, with the small motions of these poses."""
         location, offset = self.axis_line(small)
         error = self.together(self.motion, small, position)
         carried = self.together(self.carried, small, None)
@@ -216,7 +216,7 @@ class JointModel:
     def together(
         self, slots: tuple[Slot, ...], small: Mapping[Slot, Array], position: Array | None
     ) -> SmallMotion | None:
-        """The small motion that slots make together at positions (n,); None: with the axis at zero."""
+        """The small motion of several slots together; `position` (n,): moved along with the axis, None: at zero."""
         if not slots:
             return None
         terms = []
@@ -229,7 +229,7 @@ class JointModel:
         return composed(terms, any(slot in self.rotating for slot in slots))
 
     def axis_line(self, small: Mapping[Slot, Array]) -> tuple[SmallMotion | None, Array | None]:
-        """The motion of the axis line, and the zero offset (n,) or (1,): what is along or about the axis itself."""
+        """The small motion of the axis line, and the zero offset (n,) or (1,): the part along or about the axis."""
         if not self.location or self.axis is None:
             return None, None
         along = slice(3, 6) if self.axis.rotary else slice(0, 3)
@@ -243,7 +243,7 @@ class JointModel:
 
 
 def turned_with(axis: Axis, position: Array, small: Array) -> Array:
-    """A small motion (6, n) in base axes, where the error frame turns with the axis at positions (n,)."""
+    """A small motion (6, n) in base axes, turned with the axis to positions (n,) if its error frame moves with it."""
     if not (axis.moving_frame and axis.rotary):
         return small
     turned = advance(axis, position, np.stack([small[:3], small[3:]], axis=1), weight=0.0)
@@ -261,7 +261,7 @@ class JointPose:
     carried: SmallMotion | None = None
 
     def forth(self, moved: Array, weight: Weight = 1.0) -> Array:
-        """Carry outward bodies' points by B: from the joint's zero position to where it really is."""
+        """The columns after B: points of bodies outward of the joint, from its zero position to the actual one."""
         if self.location is not None:
             moved = self.location.back(moved, weight)
         if self.axis is not None:
@@ -272,7 +272,7 @@ class JointPose:
         return moved
 
     def back(self, moved: Array, weight: Weight = 1.0) -> Array:
-        """Carry by the inverse of B."""
+        """The columns after the inverse of B."""
         for small in (self.carried, self.location, self.error):
             if small is not None:
                 moved = small.back(moved, weight)
@@ -283,15 +283,15 @@ class JointPose:
 
 @frozen
 class JointChain:
-    """The joints from the tool back to the foundation, then out to the workpiece; all of them with their errors.
+    """All joints of a machine with their errors.
 
-    joints  in machine order (workpiece side from the workpiece to the foundation, then tool side), then the spindle
+    joints  in machine order (from the workpiece to the foundation, then to the tool), then the spindle
     """
 
     joints: tuple[JointModel, ...]
 
     def at(self, poses: Poses, model: ErrorModel | None) -> tuple[JointPose, ...]:
-        """The joints at these poses; without a model the nominal ones."""
+        """The joints at these poses; without a model, without errors."""
         if model is None:
             nominal = [JointPose(joint.axis, poses.positions[i]) for i, joint in enumerate(self.joints[:-1])]
             return (*nominal, JointPose(None, np.zeros(1)))
@@ -301,7 +301,7 @@ class JointChain:
 
 
 def carry(joints: tuple[JointPose, ...], moved: Array, weight: Weight = 1.0) -> Array:
-    """From the end of the tool branch to the end of the workpiece branch."""
+    """The columns carried from the end of the tool branch to the end of the workpiece branch."""
     for joint in reversed(joints):
         if joint.axis is None or not joint.axis.workpiece_side:
             moved = joint.forth(moved, weight)
@@ -312,20 +312,20 @@ def carry(joints: tuple[JointPose, ...], moved: Array, weight: Weight = 1.0) -> 
 
 
 def carried_tips(joints: tuple[JointPose, ...], tool: GaugeLine, lengths: Array, offset: Vector) -> Array:
-    """The tip of a tool of `lengths` (n,) or (1,), (3, 1, n) mm, in the frame at `offset` on the workpiece branch."""
+    """(3, 1, n) the tip of a tool of `lengths` (n,) or (1,), mm, in the frame at `offset` on the workpiece branch."""
     start = np.moveaxis(tool.tip(lengths), -1, 0)[:, None, :]
     return carry(joints, start) - columns(offset)
 
 
 def carried_frames(joints: tuple[JointPose, ...], tool: GaugeLine, lengths: Array, offset: Vector) -> Array:
-    """The frame at the tip, as `carried_tips`: the directions of its axes, and where it is, (3, 4, n)."""
+    """(3, 4, n) the frame at the tip: the directions of its axes, and its origin as in `carried_tips`."""
     tip = np.moveaxis(tool.tip(lengths), -1, 0)[:, None, :]
     axes = np.broadcast_to(FRAME_AXES, (3, 3, tip.shape[-1]))
     return carry(joints, np.concatenate([axes, tip], axis=1), OF_FRAME) - columns(offset) * OF_FRAME
 
 
 def build_chain(axes: tuple[Axis, ...], model: ErrorModel) -> JointChain:
-    """The joints of the machine and the slots that each of them has."""
+    """The joints of the machine, each with its slots."""
     slots = list(dict.fromkeys(slot for group in model.groups for slot in group.slots))
     rotating = frozenset(slot for slot in slots if model.rotates(slot))
     joints = []
@@ -340,7 +340,7 @@ def build_chain(axes: tuple[Axis, ...], model: ErrorModel) -> JointChain:
 
 
 def lies_on_axis(axis: Axis, point: Array) -> bool:
-    """Whether the axis, as a rotary one, leaves the point where it is."""
+    """Whether the axis is rotary and the point lies on its line."""
     direction = np.asarray(axis.direction)[:, None, None]
     arm = cross(direction, point - np.asarray(axis.point)[:, None, None])
     return axis.rotary and float(np.abs(arm).max()) < 1e-12

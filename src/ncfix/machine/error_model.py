@@ -1,8 +1,8 @@
-"""All effects of a machine, compiled: from poses to the small motions of each joint; where and how far these may bend.
+"""The compiled effects of a machine: the small motions of each joint at given poses, their kinks, and bounds of bends.
 
-Effects that see the same signal through bases of one family are evaluated together: one table of functions, one
-matrix product. What comes out is a *slot*: the six components of a small motion of one joint, of one sort, about one
-reference point.
+Effects of the same signal with bases of one family are evaluated together: one table of functions, one matrix product.
+Their sums are kept in *slots*: the six components of a small motion of one joint, of one kind, about one reference
+point.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ncfix.values import frozen
 
 
 class SmallMotionKind(Enum):
-    """What a small motion does to its joint."""
+    """The kinds of small motions of a joint."""
 
     MOTION = "moves the body"
     LOCATION = "moves the axis line"
@@ -31,7 +31,12 @@ class SmallMotionKind(Enum):
 
 @frozen
 class Slot:
-    """Where contributions are summed. `joint` is an index (n_axes: the spindle); `reference`: base frame, at zero."""
+    """A sum of small motions of one joint.
+
+    joint      index of the joint; n_axes: the spindle
+    sort       kind of the small motion
+    reference  reference point in the base frame with all axes at zero, mm
+    """
 
     joint: int
     sort: SmallMotionKind
@@ -40,9 +45,12 @@ class Slot:
 
 @frozen
 class Dependence:
-    """How an error depends on the state, whichever component it is: functions of one signal, perhaps times another.
+    """The dependence of an error on the state: functions of one signal, perhaps times a second signal.
 
-    direction_axis  whose direction of motion the functions need; -1: none
+    basis           the functions
+    signal          the signal that they see; None: constant
+    factor          the signal that multiplies them; None: none
+    direction_axis  index of the axis whose direction of motion they need; -1: none
     """
 
     basis: Basis
@@ -52,7 +60,7 @@ class Dependence:
 
     @property
     def signals(self) -> frozenset[Signal]:
-        """The signals that it needs."""
+        """The signals on which the error depends."""
         return frozenset(each for each in (self.signal, self.factor) if each is not None)
 
     @property
@@ -61,22 +69,22 @@ class Dependence:
         return inputs_of(self.signals)
 
     def changes_with(self, axes: Sequence[int]) -> bool:
-        """Whether the functions change with one of the axes."""
+        """Whether the functions depend on the position of any of these axes."""
         return any(axis in axes for signal in self.signals for axis in signal.axes)
 
     def arguments(self, poses: Poses) -> tuple[Array, Array]:
-        """u and the direction of motion (-1, 0, 1), as the basis sees them: (n,), or (1,) where neither varies."""
+        """u and the direction of motion (-1, 0, 1) for the basis: (n,), or (1,) if neither varies."""
         u = np.zeros(1) if self.signal is None else self.signal.u(poses, self.basis.domain)
         way = poses.direction[self.direction_axis] if self.direction_axis >= 0 else np.zeros(1)
         shape = np.broadcast_shapes(u.shape, way.shape)
         return np.broadcast_to(u, shape), np.broadcast_to(way, shape)
 
     def times_factor(self, values: Array, poses: Poses) -> Array:
-        """Values (..., n) or (..., 1) at these poses, times the factor's u if there is one."""
+        """Values (..., n) or (..., 1) at these poses, multiplied by the factor's u if there is a factor."""
         return values if self.factor is None else values * self.factor.u(poses, (-np.inf, np.inf))
 
     def rows(self, poses: Poses) -> Array:
-        """The functions at these poses, times the factor: shape (k, n)."""
+        """(k, n) the functions at these poses, multiplied by the factor."""
         u, way = self.arguments(poses)
         shape = (poses.positions.shape[1],)
         return self.times_factor(self.basis.rows(np.broadcast_to(u, shape), np.broadcast_to(way, shape)), poses)
@@ -84,10 +92,10 @@ class Dependence:
 
 @frozen
 class EffectGroup(Dependence):
-    """Effects evaluated together: `gains[s, 6, k] @ basis(u)` is added to slot `slots[s]`, times the factor's u.
+    """Effects that are evaluated together: `gains[s, 6, k] @ basis(u)`, times the factor's u, is added to `slots[s]`.
 
-    A gain takes a coefficient's function to the small motion [x y z a b c] along and about the base axes (the axis's
-    own zero position frame, if its error frame moves with it).
+    The gains give the small motion [x y z a b c] along and about the base axes; if the error frame turns with the axis,
+    along and about its directions with this axis at zero.
     """
 
     slots: tuple[Slot, ...]
@@ -102,7 +110,7 @@ class ErrorModel:
 
     @cached_property
     def signals(self) -> frozenset[Signal]:
-        """Every signal that matters."""
+        """All signals on which an effect depends."""
         return frozenset().union(*(group.signals for group in self.groups))
 
     @property
@@ -111,7 +119,7 @@ class ErrorModel:
         return inputs_of(self.signals)
 
     def small_motions(self, poses: Poses) -> Mapping[Slot, Array]:
-        """The small motions at each slot, (6, n) or (6, 1): mm along, rad about."""
+        """Slot -> (6, n or 1) its small motion, mm and rad."""
         slots: dict[Slot, Array] = {}
         for group in self.groups:
             sums = group.basis.combine(group.gains.reshape(-1, group.gains.shape[-1]), *group.arguments(poses))
@@ -121,12 +129,12 @@ class ErrorModel:
         return slots
 
     def rotates(self, slot: Slot) -> bool:
-        """Whether any effect at this slot is an angle."""
+        """Whether any effect in this slot is an angle."""
         return any(group.gains[group.slots.index(slot), 3:].any() for group in self.groups if slot in group.slots)
 
 
 def compile_effects(axes: tuple[Axis, ...], tool: GaugeLine, effects: Iterable[Effect]) -> ErrorModel:
-    """Sort the effects that are not zero into groups."""
+    """The error model of all effects that are not zero, in groups."""
     together: dict[tuple[object, ...], list[tuple[Effect, Dependence]]] = {}
     for effect in effects:
         if effect.active:
@@ -154,7 +162,7 @@ def joint_index(axes: tuple[Axis, ...], effect: Effect) -> int:
 
 
 def slot_of(axes: tuple[Axis, ...], tool: GaugeLine, effect: Effect) -> Slot:
-    """Where the effect's small motion belongs. The spindle has no motion of its own: its body is what is carried."""
+    """The slot of the effect's small motion. A location error of the spindle, which has no axis, moves its body."""
     joint = joint_index(axes, effect)
     default = tool.point if joint == len(axes) else axes[joint].reference
     sort = SmallMotionKind.MOTION
@@ -164,7 +172,7 @@ def slot_of(axes: tuple[Axis, ...], tool: GaugeLine, effect: Effect) -> Slot:
 
 
 def unit_motion(axes: tuple[Axis, ...], effect: Effect) -> Array:
-    """The small motion [x y z a b c] of an effect of 1 mm or 1 rad along the base axes, shape (6,)."""
+    """(6,) the small motion [x y z a b c] of an effect of 1 mm or 1 rad, along and about the base axes."""
     joint = joint_index(axes, effect)
     triad = BASE_AXES if joint == len(axes) else axes[joint].error_axes
     unit = np.zeros(6)
@@ -174,7 +182,7 @@ def unit_motion(axes: tuple[Axis, ...], effect: Effect) -> Array:
 
 
 def dependence_of(axes: tuple[Axis, ...], effect: Effect) -> Dependence:
-    """How an effect depends on the state."""
+    """The dependence of an effect on the state."""
     return Dependence(effect.basis, *signals_of(axes, effect), direction_axis(axes, effect))
 
 
@@ -195,7 +203,7 @@ def signals_of(axes: tuple[Axis, ...], effect: Effect) -> tuple[Signal | None, S
 
 
 def direction_axis(axes: tuple[Axis, ...], effect: Effect) -> int:
-    """The axis whose direction of motion counts: that of the input if it is one, else the effect's own; -1: none."""
+    """Index of the axis whose direction of motion the effect needs: its input if that is an axis, else its joint."""
     names = [axis.name for axis in axes]
     if not effect.basis.needs_direction:
         return -1
@@ -203,7 +211,7 @@ def direction_axis(axes: tuple[Axis, ...], effect: Effect) -> int:
 
 
 UNKNOWN_RANGE = 1000.0
-"""The range of a linear axis that does not say its own, mm."""
+"""Assumed travel of a linear axis without a range, mm."""
 
 
 def feature_lengths(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Array:
@@ -220,7 +228,7 @@ def feature_lengths(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Arra
 
 
 def breakpoints(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> tuple[Array, ...]:
-    """Of each axis, see `Machine.breakpoints`."""
+    """For each axis, see `Machine.breakpoints`."""
     places = [set[float]() for _ in axes]
     ends = [{limit / axis.unit for limit in axis.range} for axis in axes]
     for effect, index, signal, is_factor in _dependencies(axes, effects):
@@ -239,10 +247,10 @@ def breakpoints(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> tuple[Ar
 def kinks(
     axes: tuple[Axis, ...], effects: tuple[Effect, ...], points: tuple[Array, ...]
 ) -> tuple[tuple[int, Array], ...]:
-    """The axes (columns) with kinks or jumps of their errors, and where these are, ascending, mm and rad.
+    """The axes (columns) with kinks or jumps of their errors, and their positions, ascending, mm and rad.
 
-    That is at the breakpoints (`points`, of each axis), and at the ends of what a basis is given for, where its end
-    values begin to hold.
+    These are the breakpoints (`points`, for each axis), and the ends of the domain of a basis, beyond which its end
+    values hold.
     """
     places = {axis.name: set(own.tolist()) for axis, own in zip(axes, points, strict=True)}
     units = {axis.name: axis.unit for axis in axes}
@@ -254,9 +262,10 @@ def kinks(
 
 
 def needs_tool_length(axes: tuple[Axis, ...], effect: Effect) -> bool:
-    """Whether an effect moves the tip by an amount that depends on the tool's length.
+    """Whether the motion of the tip by an effect depends on the tool length.
 
-    Angles do. Not those of where a straight axis points: its body is shifted, not turned.
+    Angles depend on it, except the location errors of a linear axis: they change its direction, and shift its body
+    without turning it.
     """
     if "tool_length" in (effect.input, effect.times):
         return True
@@ -267,7 +276,7 @@ def needs_tool_length(axes: tuple[Axis, ...], effect: Effect) -> bool:
 
 
 def _dependencies(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Iterator[tuple[Effect, int, Signal, bool]]:
-    """Each effect that is not zero, with each axis whose position it depends on; the last says if it is a factor."""
+    """(effect, axis, signal, whether it is the factor) for every axis on whose position an effect depends."""
     for effect in effects:
         if effect.active:
             for signal, is_factor in zip(signals_of(axes, effect), (False, True), strict=True):
@@ -277,26 +286,26 @@ def _dependencies(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Iterat
 
 
 MORE = 1.1
-"""For products of errors."""
+"""Safety factor of bounds, for products of errors."""
 TWICE = 2.0
-"""A location error acts before the motion of its axis and, the other way, behind it."""
+"""Number of times that a location error acts: before the motion of its axis and, inversely, behind it."""
 
 
 @frozen
 class DeviationBounds:
-    """Bounds of all small motions of a machine together, and how far the error of the tip may bow on straight motions.
+    """Bounds of the small motions of a machine, and of how far the tip error leaves its chord on straight motions.
 
-    Along a motion the tip's error is the sum over all joints of Q (t + r x a): t and r the joint's small motion, a the
-    arm from its reference point to the tip, Q the rotation from there to the workpiece. Of a product the second
-    derivative is bounded by those of its factors; so that of the error is, by the ways of the axes. A curve whose
-    second derivative stays below b leaves its chord by at most b / 8. Linear axes that do not move evenly are faster at
-    times by as much as their acceleration, which also bends the error by its slopes. Products of errors are parts in
-    ten thousand of errors; `MORE` has room for them.
+    Along a motion the tip error is the sum over all joints of Q (t + r x a): t and r the small motion of the joint, a
+    the arm from its reference point to the tip, Q the rotation from there to the workpiece. The second derivative of a
+    product is bounded by the derivatives of its factors, so the second derivative of the error is bounded by the ways
+    of the axes. A curve with a second derivative of at most b leaves its chord by at most b / 8. Linear axes that do
+    not move evenly are temporarily faster, by at most their acceleration; the acceleration also bends the error in
+    proportion to its slopes. Products of errors are parts in ten thousand of errors, and are covered by `MORE`.
 
-    shift, turn       what translations (mm) and rotations (rad) add up to
-    slopes            (2, n_axes) of translations and rotations per mm or rad of each axis
-    curvatures        (2, n_axes) per mm or rad squared
-    reach             mm from any reference point to the tip with all axes at zero and no tool
+    shift, turn  bound of the sum of all translations, mm, and of all rotations, rad
+    slopes       (2, n_axes) bound of the derivatives of translations and rotations by each axis, per mm or rad
+    curvatures   (2, n_axes) bound of their second derivatives, per mm or rad squared
+    reach        largest distance, mm, of a reference point from the tip with all axes at zero and no tool
     """
 
     shift: float
@@ -306,7 +315,7 @@ class DeviationBounds:
     reach: float
 
     def arm(self, farthest: Array, tool_length: float, rotary: Mask) -> float:
-        """How far the tip is at most from any reference point, mm; arguments as in `of`."""
+        """Largest distance of the tip from any reference point, mm; arguments as in `of`."""
         return self.reach + abs(tool_length) + float(farthest[~rotary].sum())
 
     def of(
@@ -317,13 +326,12 @@ class DeviationBounds:
         rotary: Mask,
         acceleration: Array | None = None,
     ) -> tuple[Array, Array]:
-        """How far the error may leave its chord, (k,) mm, and the angles turned by, (k,) rad.
+        """(k,) bound of how far the tip error leaves its chord, mm, and (k,) the angles turned, rad.
 
-        ways          (k, n_axes) of motions, not negative, mm and rad
-        farthest      (n_axes,) from zero that they go
-        tool_length   the largest, mm
-        acceleration  (k,) mm per motion squared: of each linear axis on the way at most; all axes move evenly if not
-                      given
+        ways          (k, n_axes) ways of the axes in the motions, not negative, mm and rad
+        farthest      (n_axes,) largest distance of the axes from zero in them, mm and rad
+        tool_length   the largest tool length, mm
+        acceleration  (k,) bound of the acceleration of each linear axis, mm per motion squared; None: axes move evenly
         """
         arm: Array | float = self.arm(farthest, tool_length, rotary)
         bent: Array | float = 0.0
@@ -344,7 +352,7 @@ class DeviationBounds:
 
 
 def bow_of(axes: tuple[Axis, ...], tool: GaugeLine, effects: tuple[Effect, ...]) -> DeviationBounds | None:
-    """The bounds of a machine; None if one of its effects does not say its own, or depends on more than one axis."""
+    """The bounds of a machine; None if an effect has no bounds, depends on several signals, or acts with a lag."""
     sizes, slopes, curvatures = np.zeros(2), np.zeros((2, len(axes))), np.zeros((2, len(axes)))
     for effect in effects:
         if not effect.active:
@@ -367,9 +375,9 @@ def bow_of(axes: tuple[Axis, ...], tool: GaugeLine, effects: tuple[Effect, ...])
 
 
 def _reach(axes: tuple[Axis, ...], tool: GaugeLine, effects: tuple[Effect, ...]) -> float:
-    """`DeviationBounds.reach`: from a reference point over the rotary axes between it and the tool, along the chain.
+    """`DeviationBounds.reach`: the way from a reference point over the rotary axes between it and the tool.
 
-    However an axis turns what is behind it, it keeps its distance from that axis.
+    A rotary axis does not change the distance of the following points from itself.
     """
     slots = {slot_of(axes, tool, effect) for effect in effects if effect.active}
     ways = [[slot.reference, *(axis.point for axis in axes[slot.joint :] if axis.rotary), tool.point] for slot in slots]

@@ -1,11 +1,11 @@
-"""First order: how the tool moves relative to the workpiece when an axis moves or a joint errs, and the design matrix.
+"""First-order model: Jacobians of the tool pose by axis positions and joint errors, and the design matrix.
 
-Everything is taken at the nominal pose. A twist of a joint is [ex ey ez ea eb ec], mm and rad, along and about its
-error axes, at its reference point (`Axis.reference`, carried along by the axis). A result is [dx dy dz rx ry rz] of
-the tool tip relative to the workpiece, in the workpiece frame: what `Machine.error` gives.
+All derivatives are taken at the nominal pose. A twist of a joint is [ex ey ez ea eb ec], mm and rad, along and about
+its error axes, at its reference point (`Axis.reference`, carried along by the axis). A result is [dx dy dz rx ry rz] of
+the tool tip relative to the workpiece, in the workpiece frame, as `Machine.error` returns it.
 
 A small motion of a joint's body is written as a twist (v, w) about the base origin, in base axes with all joints
-nearer to the foundation at zero; the joint's Jacobian wants it at its reference point in its error axes.
+nearer to the foundation at zero. For the joint's Jacobian it is converted to its reference point and error axes.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Jacobians:
 
 
 def axis_jacobian(axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses) -> Array:
-    """By the axis positions, poses last: (6, n_axes, n)."""
+    """(6, n_axes, n) derivative of the tool pose by the axis positions, poses last."""
     tip, joints = _in_workpiece_frame(axes, tool, poses, range(len(axes)), with_errors=False)
     columns = np.empty((6, len(axes), poses.positions.shape[1]))
     for index, axis in enumerate(axes):
@@ -54,7 +54,7 @@ def axis_jacobian(axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses) -> Arra
 
 
 def joint_jacobian(axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses, joints: Sequence[int]) -> Array:
-    """By the error twists of some joints, poses last: (6, n_joints, 6, n)."""
+    """(6, n_joints, 6, n) derivative of the tool pose by the error twists of some joints, poses last."""
     tip, vectors = _in_workpiece_frame(axes, tool, poses, joints, with_errors=True)
     columns = np.empty((6, len(joints), 6, poses.positions.shape[1]))
     for place, (joint, own) in enumerate(zip(joints, vectors, strict=True)):
@@ -77,9 +77,11 @@ def _turning(direction: Array, arm: Array) -> Array:
 def _in_workpiece_frame(
     axes: tuple[Axis, ...], tool: GaugeLine, poses: Poses, joints: Sequence[int], with_errors: bool
 ) -> tuple[Array, list[Array]]:
-    """The tip (3, n), and the vectors of each of these joints (3, 2 or 4, n); the spindle is the last joint.
+    """The tip (3, n), and the vectors of each of these joints, (3, 2 or 4, n), in the workpiece frame.
 
-    All of them are carried together, one growing bundle of columns: each joint adds its own where it stands.
+    The vectors are direction and point of the axis; or `with_errors`, the three error axes and the reference point. The
+    spindle is the last joint. All vectors are carried together in one bundle of columns, to which each joint adds its
+    own.
     """
     bundle, weight = np.moveaxis(tool.tip(poses.tool_length), -1, 0)[:, None, :], np.ones((1, 1))
     size = 4 if with_errors else 2
@@ -104,7 +106,7 @@ def _in_workpiece_frame(
 
 
 def _error_vectors(axis: Axis, position: Array) -> Array:
-    """Error axes and reference point of a joint, in the frame of its body's zero position, (3, 4, n or 1)."""
+    """(3, 4, n or 1) error axes and reference point of a joint, in the frame of its body's zero position."""
     triad, reference = columns(*axis.error_axes), advance(axis, position, columns(axis.reference))
     if axis.moving_frame:
         triad = advance(axis, position, triad, weight=0.0)
@@ -119,14 +121,18 @@ def _joined(bundle: Array, weight: Array, own: Array, own_weight: Array) -> tupl
 
 @frozen(slots=False)
 class Dependences:
-    """How many effects depend on the state: each way once, and the number of every effect's own."""
+    """The distinct dependences on the state of several effects.
+
+    ways  each dependence once
+    own   for each effect, the number of its dependence in `ways`
+    """
 
     ways: tuple[Dependence, ...]
     own: tuple[int, ...]
 
     @staticmethod
     def of(axes: tuple[Axis, ...], effects: Sequence[Effect]) -> Dependences:
-        """What these effects depend on."""
+        """The dependences of these effects."""
         numbers: dict[object, int] = {}
         own: list[int] = []
         ways: list[Dependence] = []
@@ -141,7 +147,7 @@ class Dependences:
 
     @property
     def signals(self) -> frozenset[Signal]:
-        """All that they need."""
+        """All signals that the dependences need."""
         return frozenset().union(*(each.signals for each in self.ways))
 
 
@@ -175,7 +181,7 @@ def design(
 
 
 def unit_twist(axes: tuple[Axis, ...], tool: GaugeLine, effect: Effect, poses: Poses) -> Array:
-    """What an effect of 1 mm or 1 rad does to its joint, at its reference point in its error axes: (6, n) or (6, 1)."""
+    """(6, n or 1) twist of the joint by an effect of 1 mm or 1 rad, at its reference point in its error axes."""
     slot, motion = slot_of(axes, tool, effect), unit_motion(axes, effect)
     if slot.joint == len(axes):
         triad, (velocity, turned) = BASE_AXES, _at(columns(tool.point), _twist(motion, columns(slot.reference)))
@@ -189,7 +195,7 @@ def unit_twist(axes: tuple[Axis, ...], tool: GaugeLine, effect: Effect, poses: P
 
 
 def _joint_twist(axis: Axis, position: Array, slot: Slot, motion: Array) -> Array:
-    """The twist about the base origin, (6, 1, n) or (6, 1, 1)."""
+    """(6, 1, n or 1) twist of the body about the base origin by a small motion (6,) of an axis."""
     if slot.sort is SmallMotionKind.MOTION:
         turned = turned_with(axis, position, motion[:, None])
         return _twist(turned, advance(axis, position, columns(slot.reference)))
@@ -211,7 +217,7 @@ def _joint_twist(axis: Axis, position: Array, slot: Slot, motion: Array) -> Arra
 
 
 def _twist(motion: Array, reference: Array) -> Array:
-    """A small motion about a reference point as a twist (v, w) about the base origin: (6,) or (6, n) -> (6, 1, n)."""
+    """(6, 1, n) a small motion (6,) or (6, n) about a reference point, as a twist (v, w) about the base origin."""
     shifted, turned = motion[:3].reshape(3, 1, -1), motion[3:].reshape(3, 1, -1)
     velocity = shifted + cross(reference, turned)
     return np.concatenate([velocity, np.broadcast_to(turned, velocity.shape)])

@@ -1,4 +1,4 @@
-"""The machine: its axes, its errors, and what both do with axis positions."""
+"""The machine: its axes and errors, and the pose of the tool, nominal and actual, at axis positions."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from ncfix.toml_text import written
 from ncfix.values import frozen
 
 DEFAULT_INCREMENT = (0.001, 0.001 * np.pi / 180)
-"""What controls resolve, linear and rotary axes: 1 um, in mm, and 0.001 degree, in rad."""
+"""Least increment of linear axes, mm, and of rotary axes, rad: 1 um and 0.001 degree."""
 DEFAULT_CORRECTION = (0.5, 0.05 * np.pi / 180)
-"""Corrections that are refused are larger: 0.5 mm, and 0.05 degree, in rad."""
+"""Largest correction of linear axes, mm, and of rotary axes, rad, that is not refused: 0.5 mm and 0.05 degree."""
 
 
 @frozen(slots=False)
@@ -41,7 +41,7 @@ class Machine:
     tool              the end of the tool branch
     effects           the errors
     control           default control of the machine
-    least_increment   (mm, rad) what the control can resolve
+    least_increment   (mm, rad) smallest step of a command
     max_correction    (mm, rad) corrections above it are refused
     workpiece_offset  origin of the workpiece frame in the base frame with all axes at zero, mm
     provenance        where the errors come from; free keys
@@ -64,7 +64,7 @@ class Machine:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     conditions: Mapping[str, float] = field(default_factory=dict)
 
-    # -- what it is ---------------------------------------------------------------------------------------------------
+    # -- properties ---------------------------------------------------------------------------------------------------
 
     @property
     def axis_names(self) -> tuple[str, ...]:
@@ -72,7 +72,7 @@ class Machine:
         return tuple(axis.name for axis in self.axes)
 
     def axis(self, name: str) -> Axis | None:
-        """The axis with this letter; None for a name that is none."""
+        """The axis with this letter; None if there is none."""
         return next((axis for axis in self.axes if axis.name == name), None)
 
     def is_positioning(self, name: str) -> bool:
@@ -82,17 +82,17 @@ class Machine:
 
     @cached_property
     def rotary(self) -> Mask:
-        """Which axes are rotary, shape (n_axes,)."""
+        """(n_axes,) whether each axis is rotary."""
         return np.array([axis.rotary for axis in self.axes], dtype=np.bool_)
 
     @cached_property
     def ranges(self) -> Array:
-        """Lowest and highest position of each axis, shape (n_axes, 2), mm and rad; infinite where endless."""
+        """(n_axes, 2) lowest and highest position of each axis, mm and rad; infinite for an endless axis."""
         return np.array([axis.range for axis in self.axes], dtype=np.float64).reshape(-1, 2)
 
     @cached_property
     def is_perfect(self) -> bool:
-        """Whether no effect has a coefficient that is not zero."""
+        """Whether all coefficients of all effects are zero."""
         return not any(effect.active for effect in self.effects)
 
     @property
@@ -128,14 +128,17 @@ class Machine:
 
     @cached_property
     def hash(self) -> str:
-        """12 hexadecimal digits of what matters to a correction: not of names, uncertainties, provenance or zeros."""
+        """12 hexadecimal digits that change with any value that a correction depends on.
+
+        Names, control, uncertainties, provenance, pitches and effects that are zero do not change it.
+        """
         effects = tuple(dataclasses.replace(effect, covariance=None) for effect in self.effects if effect.active)
         axes = tuple(dataclasses.replace(axis, pitch=None) for axis in self.axes)
         bare = self.replace(name="", control=None, provenance={}, effects=effects, axes=axes)
         return hashlib.sha256(dumps(bare).encode()).hexdigest()[:12]
 
     def known_from(self, notes: Mapping[str, Any]) -> Machine:
-        """With further provenance. Where its errors came from before stays under `earlier`, the newest last."""
+        """The machine with further provenance. The former source of its errors goes to the end of `earlier`."""
         before = dict(self.provenance)
         earlier = before.pop("earlier", [])
         earlier = list(earlier) if isinstance(earlier, (list, tuple)) else [earlier]
@@ -151,19 +154,19 @@ class Machine:
 
     @cached_property
     def feature_lengths(self) -> Array:
-        """The smallest distance over which the errors may bend as each axis moves, shape (n_axes,), mm or rad.
+        """(n_axes,) the smallest distance over which errors may bend as each axis moves, mm or rad.
 
-        Spacing of knots or table entries, an eighth of a period, range / (4 degree) of a polynomial; inf for an axis
-        on which nothing depends.
+        That is the spacing of knots or table entries, an eighth of a period, range / (4 degree) of a polynomial; inf
+        for an axis on which no error depends.
         """
         lengths = error_model.feature_lengths(self.axes, self.effects)
         lengths.flags.writeable = False
         return lengths
 
     def breakpoints(self, axis: str) -> Array:
-        """Positions of an axis at which an error has a kink or a jump, ascending, shape (k,), mm or rad.
+        """(k,) positions of an axis at which an error has a kink or a jump, ascending, mm or rad.
 
-        Those of an endless axis come again with every turn.
+        For an endless axis they repeat with every turn.
         """
         return self._breakpoints[self.axis_names.index(axis)].copy()
 
@@ -173,58 +176,59 @@ class Machine:
 
     @cached_property
     def kinks(self) -> tuple[tuple[int, Array], ...]:
-        """The axes (columns) with kinks or jumps of their errors, and where these are, see `error_model.kinks`."""
+        """The axes (columns) with kinks or jumps of their errors, and their positions, see `error_model.kinks`."""
         return error_model.kinks(self.axes, self.effects, self._breakpoints)
 
     @cached_property
     def directed(self) -> tuple[int, ...]:
-        """The axes (columns) of which it matters to some error in which way they came to their position."""
+        """The axes (columns) on whose direction of motion an error depends."""
         found = {direction_axis(self.axes, effect) for effect in self.effects if effect.active}
         return tuple(sorted(found - {-1}))
 
     @property
     def depends_on_direction(self) -> bool:
-        """Whether any error depends on the way in which an axis came to its position."""
+        """Whether any error depends on the direction of motion of an axis."""
         return bool(self.directed)
 
     @cached_property
     def bow(self) -> DeviationBounds | None:
-        """How far the error of the tip may bow on straight motions; None if not known."""
+        """Bounds of how far the tip error may leave its chord on straight motions; None if not known."""
         return bow_of(self.axes, self.tool, self.effects)
 
     @cached_property
     def linear_ways(self) -> Array | None:
-        """The ways of X, Y and Z as columns, (3, 3): motions of them take the tip so far, to wherever they point.
+        """(3, 3) directions of X, Y and Z as columns, in the frame that rotary axes turn all of them together.
 
-        None without these axes, or if a rotary axis between them turns some of them only.
+        None without these axes, or if a rotary axis between them turns only some of them.
         """
         names = [self.axis_names.index(name) for name in "XYZ" if name in self.axis_names]
         return self._perfect_route.ways_together(names) if len(names) == 3 else None
 
     @cached_property
     def at_zero(self) -> tuple[Array, Array]:
-        """Where a perfect machine with all axes at zero and no tool has its tip, (3,) mm.
+        """(3,) the tip of a perfect machine without a tool, all axes at zero, mm, workpiece frame.
 
-        And how the tip follows each linear axis there, (n_axes, 3) mm per mm; zeros for rotary ones.
+        And (n_axes, 3) the derivative of the tip by each linear axis there, mm per mm; zeros for rotary axes.
         """
         nowhere, ways = np.zeros(len(self.axes)), np.zeros((len(self.axes), 3))
         ways[~self.rotary] = self.follows(nowhere, tuple(np.flatnonzero(~self.rotary).tolist())).T
         return self.tip(nowhere), ways
 
-    # -- what it does -------------------------------------------------------------------------------------------------
+    # -- poses and their derivatives ----------------------------------------------------------------------------------
 
     def tip(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
-        """Where the tip of a perfect machine is in the workpiece frame, shape (..., 3) [mm]."""
+        """(..., 3) the tip of a perfect machine in the workpiece frame, mm."""
         return self._tip(q, State(tool_length), None)
 
     def actual_tip(self, q: ArrayLike, state: State = State()) -> Array:  # noqa: B008
-        """Where the tip really is in the workpiece frame, shape (..., 3) [mm]."""
+        """(..., 3) the tip of the machine with its errors in the workpiece frame, mm."""
         return self._tip(q, state, None if self.is_perfect else self._model)
 
     def gaps(self, meant: Array, done: Sequence[Array], state: State, tip: Array | None = None) -> list[Array]:
-        """Where the tip really is with the axes at each of `done`, minus where a perfect machine has it at `meant`.
+        """For each of `done`: (n, 3) the actual tip with the axes there minus the perfect tip at `meant`, mm.
 
-        All (n, n_axes); (n, 3) mm each, and `tip`: where that is, if known. Sines are worked out once if they can be.
+        meant, done  (n, n_axes) axis positions; sines of equal rotary positions are computed once
+        tip          (n, 3) the perfect tip, mm, if known
         """
         model, perfect = None if self.is_perfect else self._model, self._perfect_route
         route = perfect if model is None else self._route
@@ -243,12 +247,12 @@ class Machine:
         state: State = State(),  # noqa: B008
         target: ArrayLike | None = None,
     ) -> Aim:
-        """Where linear axes (columns `axes`: X, Y, Z) must stand so that the real tip is at `target`.
+        """The positions of linear axes (columns `axes`: X, Y, Z) at which the actual tip is at `target`.
 
-        q       (n, n_axes) where to begin, and where all other axes are
-        target  (n, 3) mm; where a perfect machine has the tip at q if not given
+        q       (n, n_axes) positions to begin with; all other axes stay there
+        target  (n, 3) mm; None: the tip of a perfect machine at q
 
-        Rows are poses in what is returned. An axis that cannot bring the tip there is left where that shows.
+        The rows of `Aim.place` are poses here, (n, 3).
         """
         _, poses = self._poses(q, state, self._model)
         goal = None if target is None else np.ascontiguousarray(np.asarray(target, dtype=np.float64).T)
@@ -282,7 +286,7 @@ class Machine:
         return self._pose(q, State(tool_length), None)
 
     def actual(self, q: ArrayLike, state: State = State()) -> Array:  # noqa: B008
-        """`workpiece_from_tool` as it really is: the exact composition of all finite motions, shape (..., 4, 4)."""
+        """`workpiece_from_tool` with errors: the exact composition of all finite motions, shape (..., 4, 4)."""
         return self._pose(q, state, None if self.is_perfect else self._model)
 
     def error(self, q: ArrayLike, state: State = State()) -> Array:  # noqa: B008
@@ -296,7 +300,7 @@ class Machine:
         return np.concatenate([shift, turn], axis=-1)
 
     def follows(self, q: ArrayLike, axes: tuple[int, ...]) -> Array:
-        """How the tip of a perfect machine follows linear axes, shape (..., 3, axes) mm per mm, workpiece frame."""
+        """(..., 3, axes) derivative of the tip of a perfect machine by linear axes, mm per mm, workpiece frame."""
         route = self._perfect_route
 
         def ways(chunk: Poses, _: slice) -> Array:
@@ -309,11 +313,11 @@ class Machine:
     def xyz_for_tip(
         self, q: ArrayLike, axes: tuple[int, ...], target: ArrayLike, tool_length: ArrayLike = 0.0
     ) -> Array:
-        """Where X, Y and Z (columns `axes`) of a perfect machine have to be for the tip to be at `target` (n, 3) mm.
+        """(n, 3) positions of X, Y and Z (columns `axes`) of a perfect machine with the tip at `target` (n, 3), mm.
 
-        q  (n, n_axes) where all other axes are
+        q  (n, n_axes) positions of all other axes
 
-        Shape (n, 3). Only with `linear_ways` that span space.
+        Only for machines with `linear_ways` that span space.
         """
         assert self.linear_ways is not None
         goal = np.ascontiguousarray(np.asarray(target, dtype=np.float64).T)
@@ -342,10 +346,10 @@ class Machine:
         return Jacobians(self.axis_jacobian(q, tool_length), joints)
 
     def joint_errors(self, q: ArrayLike, state: State = State()) -> Array:  # noqa: B008
-        """The error twist of each joint to first order, shape (..., n_joints, 6): [ex ey ez ea eb ec], mm and rad.
+        """(..., n_joints, 6) the error twist of each joint to first order: [ex ey ez ea eb ec], mm and rad.
 
-        In its error axes, at its reference point, location errors included; the last joint is the spindle. Times
-        `jacobians(q).joints` it is `error(q)` up to terms of second order.
+        It is given in the joint's error axes, at its reference point, and includes location errors. The last joint is
+        the spindle. `jacobians(q).joints` times it is `error(q)` up to second-order terms.
         """
         shape, poses = self._poses(q, state, self._model)
         active = [effect for effect in self.effects if effect.active]
@@ -357,16 +361,16 @@ class Machine:
         state: State = State(),  # noqa: B008
         effects: Sequence[Effect] | None = None,
     ) -> Array:
-        """The derivative of `error` by the coefficients at zero error, shape (..., 6, k).
+        """(..., 6, k) the derivative of `error` by the coefficients of effects, at zero error.
 
-        The columns are those of the effects in turn, whatever their present coefficients; `effects` are those of the
-        machine if not given, and may be any others of its joints.
+        effects  any effects of the joints of this machine; None: its own. The columns are their coefficients in turn;
+                 the values of these do not matter.
         """
         shape, found = self._design(q, state, self.effects if effects is None else tuple(effects))
         return poses_first(found, shape)
 
     def design_columns(self, q: Array, state: State, effects: Sequence[Effect]) -> Array:
-        """As `design`, column by column, (6, k, n) for q (n, n_axes): quicker where there are many effects."""
+        """(6, k, n) like `design` for q (n, n_axes), but with poses last: faster for many effects."""
         return self._design(q, state, tuple(effects))[1]
 
     def _design(self, q: ArrayLike, state: State, effects: tuple[Effect, ...]) -> tuple[tuple[int, ...], Array]:
@@ -393,7 +397,7 @@ class Machine:
     def _tips_along(
         self, route: Route | None, part: Poses, model: ErrorModel | None, turns: Turns | None = None
     ) -> Array:
-        """The tip (3, n) by the route, but for poses at which small motions are large."""
+        """(3, n) the tip by the route; by the chain for poses at which small motions are large, or without a route."""
         if route is None:
             return self._carried_tips(part, model)[:, 0]
         tip, largest = route.tips(part, turns)
@@ -403,7 +407,7 @@ class Machine:
         return tip
 
     def _carried_tips(self, part: Poses, model: ErrorModel | None) -> Array:
-        """The tip by any chain, with small motions of any size, (3, 1, n)."""
+        """(3, 1, n) the tip by the chain, which allows small motions of any size."""
         return carried_tips(self._chain.at(part, model), self.tool, part.tool_length, self.workpiece_offset)
 
     def _pose(self, q: ArrayLike, state: State, model: ErrorModel | None) -> Array:
@@ -422,7 +426,7 @@ class Machine:
         function: Callable[[Poses, slice], Array],
         *shape: int,
     ) -> Array:
-        """A function of poses, and of which these are, that gives columns (*shape, n), over all: (..., *shape)."""
+        """(..., *shape) the values of a function of poses and their slice, which returns (*shape, n), at all poses."""
         leading, poses = self._poses(q, state, model)
         return poses_first(poses.evaluated(function, *shape), leading)
 

@@ -1,11 +1,11 @@
-"""The way of the tool tip through a machine, written out as numbers: what `steps` go by.
+"""Routes: the kinematic chain from tool tip to workpiece as a list of numbers, which `steps` evaluates.
 
-Motions that are the same at all poses are worked into the steps when the route is made: where the axes really lie,
-their zero offsets, the workpiece offset. Each is moved ahead of the steps before it, which are seen from behind it from
-then on, until it has arrived at the tip of the tool. So a pose costs little more than on a machine without such errors.
+Motions that are the same at all poses (location errors, zero offsets, the workpiece offset) are merged into the steps
+when the route is made: each is moved ahead of all steps before it, which are transformed by it, up to the tool tip. So
+a pose costs little more than on a machine without such errors.
 
-Powers and harmonics of axis positions are worked out on the way. All other functions come from their bases as columns,
-whatever they are, and are added up with the rest.
+Powers and harmonics of axis positions are evaluated along the route. All other functions are evaluated by their bases
+as columns, and added to the rest.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ if TYPE_CHECKING:
     from ncfix.core.chain import PoseBatch, RouteSteps
 
 SUMS = (PiecewiseLinear, Spline, PiecewiseConstant)
-"""Bases that add up their functions themselves, each sum on its own."""
+"""Bases that evaluate weighted sums of their functions directly, without the single functions."""
 BATCH = 64
-"""Poses that the compiled core takes at a time."""
+"""Number of poses that the compiled core takes at a time."""
 CACHE_LINE = 8
-"""Numbers in a line of the cache: room that begins with one is gone through faster."""
+"""Number of floats in a cache line; aligned memory is faster."""
 ANY = (1.0, -np.inf, np.inf, 0.0, 1.0)
-"""A signal that is the position as it is."""
+"""The signal numbers (see `Functions.signal`) of an unchanged position."""
 ClampedAngle = tuple[int, float, float]
-"""An axis whose harmonics are held at the ends of a range, and these, rad."""
+"""(axis, low, high): a rotary axis whose harmonics are held at the ends of a range, rad."""
 
 
 @frozen
 class SmallMotionPlace:
-    """Where a small motion is done: the slots whose sum it is, and the rotation from base axes to those of the step."""
+    """A small motion of a route: the slots whose sum it is, and the rotation from base axes to the axes of the step."""
 
     slots: tuple[Slot, ...]
     turn: Array
@@ -54,21 +54,21 @@ class SmallMotionPlace:
 
 @frozen
 class Terms:
-    """What has to be given besides the positions.
+    """Functions of a route that are evaluated by their bases, and rotary axes that are clamped.
 
-    groups  whose bases work out functions, or sums with these gains (m, k)
-    held    axes whose harmonics are held at the ends of a range, rad
+    groups  groups with their gains (m, k), if the basis evaluates weighted sums; None: single functions
+    held    axes whose harmonics are held at the ends of a range
     """
 
     groups: tuple[tuple[EffectGroup, Array | None], ...]
     held: tuple[ClampedAngle, ...]
 
     def see(self, axes: Sequence[int]) -> bool:
-        """Whether any of these functions changes with one of the axes."""
+        """Whether any of these functions depends on the position of one of the axes."""
         return any(group.changes_with(axes) for group, _ in self.groups)
 
     def given(self, poses: Poses) -> list[Array]:
-        """The functions that bases work out, (n,) or (1,) each, in order."""
+        """The functions or sums that bases evaluate at these poses, (n,) or (1,) each, in order."""
         found: list[Array] = []
         for group, gains in self.groups:
             u, way = group.arguments(poses)
@@ -79,7 +79,7 @@ class Terms:
 
 @frozen
 class _Part:
-    """A group as numbers: its functions, and the gains (parts, functions) by which they add to the small motions."""
+    """A group of effects as numbers: its functions, and their gains (parts, functions) to the small motions."""
 
     family: int
     axis: int
@@ -91,7 +91,7 @@ class _Part:
 def terms_of(
     axes: tuple[Axis, ...], groups: Sequence[EffectGroup], places: Sequence[SmallMotionPlace], held: list[ClampedAngle]
 ) -> tuple[Functions, Terms]:
-    """The functions of the small motions at `places`, and what has to be given for them; `held` is added to."""
+    """The functions of the small motions at `places`, and those that bases evaluate; new clamped axes go to `held`."""
     parts: list[_Part] = []
     given: list[tuple[EffectGroup, Array | None]] = []
     for group in groups:
@@ -129,7 +129,7 @@ def terms_of(
 
 
 def _gains(group: EffectGroup, places: Sequence[SmallMotionPlace]) -> Array:
-    """By which the functions of a group add to the numbers of all small motions, (PARTS * places, functions)."""
+    """(PARTS * places, functions) the gains of the functions of a group to the numbers of all small motions."""
     gains = np.zeros((len(places), PARTS, group.gains.shape[-1]))
     for total, place in zip(gains, places, strict=True):
         for slot in place.slots:
@@ -142,7 +142,7 @@ def _gains(group: EffectGroup, places: Sequence[SmallMotionPlace]) -> Array:
 
 
 def _sorted(part: _Part, width: int) -> _Part:
-    """The functions in ascending order, `width` of them with each order."""
+    """The part with its functions in ascending order; there are `width` functions of each order."""
     order = np.argsort(part.orders, kind="stable")
     take = (width * order[:, None] + np.arange(width)).ravel()
     orders = tuple(part.orders[i] for i in order.tolist() for _ in range(width))
@@ -150,7 +150,7 @@ def _sorted(part: _Part, width: int) -> _Part:
 
 
 def _wave_row(rows: int, signal: Signal, held: list[ClampedAngle]) -> int:
-    """The row of the sine that a wave is made of: its axis's, or one held at the ends of a range."""
+    """The row of sines for a harmonic: that of its axis, or of the axis held at the ends of a range."""
     assert signal.axis is not None
     if not np.isfinite([signal.low, signal.high]).any():
         return signal.axis
@@ -161,7 +161,7 @@ def _wave_row(rows: int, signal: Signal, held: list[ClampedAngle]) -> int:
 
 
 def _given(group: EffectGroup, gains: Array, given: list[tuple[EffectGroup, Array | None]]) -> _Part:
-    """A group whose basis works out its functions, or its sums."""
+    """A group whose basis evaluates its functions, or its weighted sums; it is added to `given`."""
     if not isinstance(group.basis, SUMS):
         given.append((group, None))
         return _Part(GIVEN, 0, ANY, (0,) * gains.shape[1], gains)
@@ -171,14 +171,16 @@ def _given(group: EffectGroup, gains: Array, given: list[tuple[EffectGroup, Arra
 
 
 Turns = tuple[Array, Array]
-"""Sines and versines (1 - cosine) of rotary axes, see `Route.turns`."""
+"""(sines, versines) of rotary axes, see `Route.turns`; the versine is 1 - cosine."""
 
 
 @frozen(slots=False)
 class Route:
-    """The steps of a machine in two forms: lists, to go through with columns, and arrays for the compiled core.
+    """The steps of a machine from the tool tip to the workpiece.
 
-    terms   what the small motions are made of
+    plain   steps and functions as lists, for columns of poses
+    arrays  the same as arrays, for the compiled core
+    terms   the functions that bases evaluate
     rotary  the columns of the rotary axes
     """
 
@@ -189,17 +191,17 @@ class Route:
 
     @cached_property
     def compiled(self) -> RouteSteps:
-        """The steps as the compiled core takes them."""
+        """The steps in the form of the compiled core."""
         from ncfix.core import chain
 
         return chain.RouteSteps(*self.arrays[0], *self.arrays[1])
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but what only this process can use: workers, and copies, make their own."""
+        """The state without the compiled form, which cannot be copied to another process."""
         return {name: value for name, value in self.__dict__.items() if name != "compiled"}
 
     def tips(self, poses: Poses, turns: Turns | None = None) -> tuple[Array, Array]:
-        """The tip (3, n), and the largest squared angle of a small motion at each pose (n,); `turns` if known."""
+        """(3, n) the tip, mm, and (n,) the largest squared angle of a small motion, rad^2; `turns`, if known."""
         turns = turns or self.turns(poses)
         n = poses.positions.shape[1]
         if core.engaged() and n > 1:
@@ -211,7 +213,7 @@ class Route:
         return self.carried(poses, turns, steps.at_tip(self.plain[0], poses.tool_length))
 
     def carried(self, poses: Poses, turns: Turns, point: Sequence[Array] | Array) -> tuple[Array, Array]:
-        """As `tips`, of any point (3, n), not compiled."""
+        """Like `tips`, for any point (3, n) instead of the tip, not compiled."""
         legs, functions = self.plain
         results, values = [0.0] * len(functions.order), [0.0] * (PARTS * (1 + max(legs.small, default=-1)))
         steps.work_out_functions(functions, poses.positions, *turns, self.terms.given(poses), results)
@@ -222,16 +224,16 @@ class Route:
         return found, largest
 
     def ways(self, axes: Sequence[int], turns: Turns) -> list[tuple[Number, Number, Number]]:
-        """How the tip follows linear axes, mm per mm: a column for each axis and direction; small motions are left out.
+        """The derivative of the tip by linear axes, mm per mm, without small motions: x, y, z for each axis.
 
-        One number where it is alike at all poses.
+        Each is a column (n,), or one number if it is the same at all poses.
         """
         return [steps.follows(self.plain[0], axis, *turns) for axis in axes]
 
     def xyz_for_tip(self, poses: Poses, axes: Sequence[int], back: Array, target: Array) -> Array:
-        """Where linear axes have to be for the tip to be at `target` (3, n) mm, (3, n); of a route without errors.
+        """(3, n) the positions of linear axes with the tip at `target` (3, n), mm; for a route without errors.
 
-        back  (3, 3) what takes a way of the tip to one of the axes: the inverse of `ways_together`
+        back  (3, 3) inverse of `ways_together`
         """
         if core.engaged() and target.shape[1] > 1:
             from ncfix.core import aim
@@ -248,7 +250,7 @@ class Route:
         return out
 
     def ways_together(self, axes: Sequence[int]) -> Array | None:
-        """The directions of linear axes as columns; None if they are none, or if others turn some of them only."""
+        """(3, axes) directions of linear axes as columns; None if an axis between them turns only some of them."""
         legs, found = self.plain[0], []
         for i, (kind, axis) in enumerate(zip(legs.kind, legs.axis, strict=True)):
             if kind == SHIFT and axis in axes:
@@ -258,7 +260,7 @@ class Route:
         return np.array([direction for _, direction in sorted(found)]).T if len(found) == len(axes) else None
 
     def turns(self, poses: Poses) -> Turns:
-        """Sines and versines by columns, (n_axes + k, n): of the rotary axes, and of the k held by their ranges."""
+        """(n_axes + k, n) sines and versines of the rotary axes, and of the k axes held at the ends of a range."""
         q, held = poses.positions, self.terms.held
         sine, versed = (np.empty((len(q) + len(held), q.shape[1])) for _ in range(2))
         for axis in self.rotary:
@@ -272,10 +274,7 @@ class Route:
 
 
 def batch_of(poses: Poses, turns: Turns, given: Sequence[Array], *routes: Route) -> PoseBatch:
-    """Poses for the compiled core, with room for what routes need; `given` are the functions that come from elsewhere.
-
-    Each route has small motions of its own.
-    """
+    """Poses for the compiled core, with memory for these routes; `given`: the functions evaluated by their bases."""
     from ncfix.core import chain
 
     n = poses.positions.shape[1]
@@ -292,11 +291,11 @@ def batch_of(poses: Poses, turns: Turns, given: Sequence[Array], *routes: Route)
 
 @frozen(slots=False)
 class SplitRoute:
-    """A route in two, for those who bring the tip to a point by linear axes.
+    """A route in two parts, for finding the linear axis positions that bring the tip to a point.
 
-    axes    their columns, X Y Z
-    within  the steps from the tip up to the last one that changes with these axes
-    behind  those behind it, undone: they take the point to where the tip has to be after the first ones
+    axes    the columns of X, Y and Z
+    within  the steps from the tip up to the last one that depends on these axes
+    behind  the inverse of the further steps: it takes the target to where the tip must be after `within`
     """
 
     axes: tuple[int, int, int]
@@ -307,10 +306,10 @@ class SplitRoute:
 def route_of(
     axes: tuple[Axis, ...], tool: GaugeLine, joints: tuple[JointModel, ...], model: ErrorModel | None, offset: Vector
 ) -> Route | None:
-    """The route through joints with the errors of a model, or without; None where it cannot be written as steps.
+    """The route through joints with the errors of a model, or without errors; None if it cannot be written as steps.
 
-    That is where the place of an axis changes from pose to pose, and where errors of a rotary axis refer to several
-    points of which one does not lie on it.
+    It cannot if the location of an axis changes from pose to pose, or if error motions of a rotary axis refer to
+    several points one of which does not lie on the axis.
     """
     groups = () if model is None else model.groups
     path = _path(tool, joints, groups, offset, real=model is not None)
@@ -320,9 +319,9 @@ def route_of(
 def split_route_of(
     axes: tuple[Axis, ...], tool: GaugeLine, joints: tuple[JointModel, ...], model: ErrorModel, offset: Vector
 ) -> SplitRoute | None:
-    """The route with errors in two, for those who move X, Y and Z.
+    """The route with errors, split for X, Y and Z.
 
-    None without a route or these axes, and where functions that bases work out change with them.
+    None without a route or these axes, or if functions evaluated by their bases depend on these axes.
     """
     path, names = _path(tool, joints, model.groups, offset, real=True), [axis.name for axis in axes]
     if path is None or not set(names).issuperset("XYZ"):
@@ -339,7 +338,7 @@ def split_route_of(
 def _path(
     tool: GaugeLine, joints: tuple[JointModel, ...], groups: tuple[EffectGroup, ...], offset: Vector, *, real: bool
 ) -> tuple[Array, list[Link]] | None:
-    """The start of a route, as in `Steps`, and its steps, with errors if it is the `real` one; None without one."""
+    """The start of a route, as in `Steps`, and its steps, `real`: with errors; None if there is no route."""
     links: list[Link] = []
     for index in reversed(range(len(joints))):
         own = _forth(index, joints[index], groups) if real else _nominal(index, joints[index])
@@ -348,7 +347,7 @@ def _path(
         axis = joints[index].axis
         links += [link.undone() for link in reversed(own)] if axis is not None and axis.workpiece_side else own
     found, ahead = [], se3.shift(-np.asarray(offset))
-    for link in reversed(links):  # motions that are the same at all poses are done before all others instead
+    for link in reversed(links):  # motions that are the same at all poses are moved ahead of all others
         if link.rigid is not None:
             ahead = ahead @ link.rigid
         else:
@@ -360,7 +359,7 @@ def _path(
 def _written_out(
     axes: tuple[Axis, ...], groups: tuple[EffectGroup, ...], start: Array, links: list[Link], held: list[ClampedAngle]
 ) -> Route:
-    """Steps as numbers; the ranges at whose ends harmonics are held are added to `held`."""
+    """The route of these steps as numbers; clamped axes are added to `held`."""
     places = [SmallMotionPlace(link.slots, link.seen_from[:3, :3]) for link in links if link.slots]
     functions, terms = terms_of(axes, groups, places, held)
     small = np.cumsum([bool(link.slots) for link in links]) - 1
@@ -381,11 +380,11 @@ def _written_out(
 
 @frozen
 class Link:
-    """One step, not yet as numbers; `axis`, `direction`, `point` and `center` as in `Steps`.
+    """One step before it is written as numbers; `axis`, `direction`, `point` and `center` as in `Steps`.
 
-    slots      of a small motion: those whose sum it is
-    seen_from  (4, 4) takes what it is given in to what it is done in
-    rigid      (4, 4) a motion that is the same at all poses; the rest means nothing then
+    slots      the slots whose sum is the small motion; empty for other steps
+    seen_from  (4, 4) transformation from the frame of the slots to that of the step
+    rigid      (4, 4) a motion that is the same at all poses; then the other fields have no meaning
     """
 
     kind: int = SHIFT
@@ -399,28 +398,28 @@ class Link:
     rigid: Array | None = None
 
     def undone(self) -> Link:
-        """The step that undoes it."""
+        """The inverse step."""
         if self.rigid is not None:
             return replace(self, rigid=se3.inverse(self.rigid))
         other = BACK if self.kind == FORTH else FORTH
         return replace(self, kind=other) if self.slots else replace(self, direction=-self.direction)
 
     def changes_with(self, axes: Sequence[int], groups: tuple[EffectGroup, ...]) -> bool:
-        """Whether it is one along these axes, or a small motion that changes with one of them."""
+        """Whether the step moves along one of these axes, or is a small motion that depends on one."""
         if not self.slots:
             return self.axis in axes
         own = [group for group in groups if any(slot in group.slots for slot in self.slots)]
         return self.axis in axes or any(group.changes_with(axes) for group in own)
 
     def behind(self, motion: Array) -> Link:
-        """The step as it is done when `motion` has been done before it, and no longer after it."""
+        """The equivalent step if `motion` (4, 4) is done before it instead of after it."""
         turn, way = motion[:3, :3], motion[:3, 3]
         point, center = turn @ self.point + way, turn @ self.center + way
         return replace(self, direction=turn @ self.direction, point=point, center=center, seen_from=motion)
 
 
 def _nominal(index: int, joint: JointModel) -> list[Link]:
-    """What a joint does to what lies outward of it."""
+    """The nominal motion of a joint, for all bodies outward of it."""
     axis = joint.axis
     if axis is None:
         return []
@@ -428,7 +427,7 @@ def _nominal(index: int, joint: JointModel) -> list[Link]:
 
 
 def _forth(index: int, joint: JointModel, groups: tuple[EffectGroup, ...]) -> list[Link] | None:
-    """As `_nominal`, with the errors of the joint; None where it cannot be written as steps."""
+    """Like `_nominal`, with the errors of the joint; None if they cannot be written as steps."""
     placed = (*joint.location, *joint.carried)
     if any(slot in group.slots and group.signals for group in groups for slot in placed):
         return None
@@ -450,10 +449,10 @@ def _forth(index: int, joint: JointModel, groups: tuple[EffectGroup, ...]) -> li
 
 
 def _error_motion(index: int, joint: JointModel) -> list[Link] | None:
-    """The motion of a joint and its error motion, in the order in which the center of the error motion stays in place.
+    """The nominal motion of a joint and its error motion, in the order in which the centre of the latter is fixed.
 
-    The error motion of a linear axis, or in a frame that turns with its axis, is the same before the motion of the axis
-    about its center as it is with all axes at zero.
+    The error motion of a linear axis, and one in a frame that turns with its axis, can be done before the motion of the
+    axis, about its centre with all axes at zero. None if it cannot be written as steps.
     """
     axis, moved = joint.axis, _nominal(index, joint)
     if not joint.motion:
@@ -470,6 +469,6 @@ def _error_motion(index: int, joint: JointModel) -> list[Link] | None:
 
 
 def _rigid(small: SmallMotion) -> Array:
-    """A small motion of one pose as a matrix."""
+    """(4, 4) a small motion that is the same at all poses."""
     way, turn = (np.zeros(3) if part is None else part.ravel() for part in (small.translation, small.rotation))
     return se3.shift(way) @ se3.turn(turn, small.center.ravel())

@@ -117,7 +117,10 @@ def rotation_vector(rotation: ArrayLike) -> Array:
 
 
 def _near_half_turn(r: Array, sine: Array, angle: Array) -> Array:
-    """There the sine is lost to rounding: the axis comes from the symmetric part, its sign from what sine is left."""
+    """`rotation_vector` near half a turn, where the sine is lost to rounding.
+
+    The axis comes from the symmetric part of the rotation, its sign from the remainder of the sine.
+    """
     symmetric = 0.5 * (r + np.swapaxes(r, -1, -2)) + np.eye(3)
     column = np.argmax(np.diagonal(symmetric, axis1=-2, axis2=-1), axis=-1)
     axis = np.take_along_axis(symmetric, column[..., None, None], axis=-1)[..., 0]

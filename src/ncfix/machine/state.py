@@ -1,4 +1,4 @@
-"""What the errors depend on: axis positions, the rest of the state, the signals made of them; poses in columns."""
+"""The state on which errors depend: axis positions, tool length, direction, inputs, and signals made of these."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from ncfix.machine.axes import Axis
 from ncfix.values import frozen
 
 CHUNK = 8192
-"""Poses handled at a time: few enough that the intermediate columns stay in the processor's cache."""
+"""Number of poses handled at a time, so that intermediate columns stay in the processor's cache."""
 LARGE = 1 << 15
-"""The same where compiled loops go through them, which take them by the handful."""
+"""The same for compiled loops, which work on few poses at a time anyway."""
 
 
 @frozen
 class State:
-    """The rest of the state. Everything broadcasts with the leading dimensions of the axis positions.
+    """The state besides the axis positions. All values broadcast with the leading dimensions of the positions.
 
     tool_length  mm, gauge line to tip, shape ()
-    direction    -1, 0 (unknown) or 1 per axis: the way in which it came to its position; shape (..., n_axes), or 0
+    direction    direction in which each axis came to its position: -1, 1, or 0 if unknown; shape (..., n_axes), or 0
     inputs       other signals by name: `temp_spindle`, `time_s`, `load_kg`, ...; shape () each
     """
 
@@ -50,28 +50,28 @@ class Poses:
     inputs: Mapping[str, Array]
 
     def chunks(self) -> Iterator[tuple[slice, Poses]]:
-        """The poses in runs."""
+        """The poses in chunks, each with its slice."""
         size = LARGE if core.engaged() else CHUNK
         for start in range(0, self.positions.shape[1], size):
             part = slice(start, start + size)
             yield part, self.part(part)
 
     def evaluated(self, function: Callable[[Poses, slice], Array], *shape: int) -> Array:
-        """A function of poses and which of these they are, that gives (*shape, n), over all of them, run by run."""
+        """(*shape, n) the values of a function of poses and their slice, evaluated chunk by chunk."""
         out = np.empty((*shape, self.positions.shape[1]))
         for part, chunk in self.chunks():
             out[..., part] = function(chunk, part)
         return out
 
     def part(self, part: slice | Index) -> Poses:
-        """Some of the poses."""
+        """The poses `part`."""
         inputs = {name: values[part] for name, values in self.inputs.items()}
         length, direction = some(self.tool_length, part), some(self.direction, part)
         return Poses(self.positions[:, part], length, direction, inputs)
 
 
 def behind_each_other(kinds: Sequence[Poses]) -> Poses:
-    """Poses in several positions, all else of which is alike in form, as one."""
+    """Several sets of poses as one, with the same inputs and the same shapes of the other columns."""
     if len(kinds) == 1:
         return kinds[0]
     return Poses(
@@ -83,14 +83,14 @@ def behind_each_other(kinds: Sequence[Poses]) -> Poses:
 
 
 def _columns(values: Sequence[Array]) -> Array:
-    """What is known of each pose behind each other; of one for all as it is."""
+    """State columns with one value per pose, joined; a single value for all poses is passed through unchanged."""
     return values[0] if values[0].shape[-1] == 1 else np.concatenate(values, axis=-1)
 
 
 def flatten(q: ArrayLike, state: State, axes: tuple[Axis, ...], names: frozenset[str]) -> tuple[tuple[int, ...], Poses]:
-    """The common leading shape, and the poses with the inputs called `names`.
+    """The common leading shape, and the poses with the inputs `names`.
 
-    Raises `UsageError` NCF340 if an input is missing and ValueError if the shapes do not fit.
+    Raises `UsageError` NCF340 if an input is missing, and ValueError if the shapes do not match.
     """
     q = np.asarray(q, dtype=np.float64)
     if q.shape[-1:] != (len(axes),):
@@ -132,7 +132,7 @@ def _directions(values: Array, shape: tuple[int, ...], n_axes: int) -> Array:
 
 
 def some(values: Array, part: slice | Index) -> Array:
-    """What is known of some poses, (..., n); of one value for all that."""
+    """Values (..., n) of the poses `part`; a single value for all poses is passed through unchanged."""
     return values if values.shape[-1] == 1 else values[..., part]
 
 
@@ -143,19 +143,20 @@ def poses_first(values: Array, shape: tuple[int, ...]) -> Array:
 
 TIME = "time_s"
 SUM = "+"
-"""Between rotary axes whose angles add: B+C is how an arm leans behind two parallel joints."""
+"""Sign between the letters of rotary axes whose angles are added: B+C is the lean of an arm behind two parallel joints.
+"""
 
 
 @frozen
 class Signal:
-    """One number per pose, made ready for a basis: u = (x - center) / scale, x held at the ends of the axis range.
+    """A quantity, one number per pose, and its argument for a basis: u = (x - center) / scale, x held in its range.
 
-    name        axis letter, rotary axes whose angles add (B+C), or input
+    name        axis letter, letters of rotary axes whose angles are added (B+C), or name of an input
     axis        index of the axis; None for a sum or a state input
     summed      indices of the axes of a sum
     unit        internal units per unit of x
-    low, high   the x beyond which the end values hold
-    endless     x is an angle that may turn round and round
+    low, high   range of x; outside it, x is held at the nearer end
+    endless     x is the angle of an axis without limits, so that full turns are equivalent
     center, scale   of u
     constant_s  time constant of a first-order lag; 0 for none
     """
@@ -173,22 +174,22 @@ class Signal:
 
     @property
     def axes(self) -> tuple[int, ...]:
-        """The indices of all axes that it is made of."""
+        """The indices of all axes on which the signal depends."""
         return self.summed if self.axis is None else (self.axis,)
 
     @property
     def inputs(self) -> frozenset[str]:
-        """The state inputs that it is made of."""
+        """The state inputs on which the signal depends."""
         names = set() if self.axes else {self.name}
         return frozenset(names | {TIME} if self.constant_s else names)
 
     @property
     def lagged_name(self) -> str:
-        """Where its values after the lag are kept."""
+        """The name of its values after the lag in `Poses.inputs`."""
         return f"{self.name} after {self.constant_s!r} s"
 
     def raw(self, poses: Poses) -> Array:
-        """x, (n,), not yet held, in the unit of the machine file."""
+        """(n,) x before it is held in its range, in the unit of the machine file."""
         if not self.axes:
             return poses.inputs[self.name]
         if self.axis is None:
@@ -196,7 +197,7 @@ class Signal:
         return poses.positions[self.axis] / self.unit
 
     def u(self, poses: Poses, domain: tuple[float, float]) -> Array:
-        """What the basis sees, (n,), without a unit; `domain` is the basis's own range of u."""
+        """(n,) the argument u of the basis, without a unit; `domain`: the basis's own range of u."""
         x = poses.inputs[self.lagged_name] if self.constant_s else self.raw(poses)
         if self.endless:
             x = turned_back(x, self.low, self.high)
@@ -207,7 +208,7 @@ class Signal:
 
 
 def inputs_of(signals: Iterable[Signal]) -> frozenset[str]:
-    """The state inputs that these are made of."""
+    """The state inputs on which these signals depend."""
     return frozenset(name for signal in signals for name in signal.inputs)
 
 
@@ -225,9 +226,9 @@ def signal_called(axes: tuple[Axis, ...], name: str) -> Signal:
 
 
 def turned_back(angle: Array, low: float, high: float, turn: float = 360.0) -> Array:
-    """Angles outside low ... high moved by whole turns into it, or next to its nearer end; infinite limits leave them.
+    """Angles moved by full turns into low ... high, or next to its nearer end; with infinite limits unchanged.
 
-    So an angle that rounding puts a little below `low` stays there: what holds at `low` holds for it.
+    So an angle that rounding puts a little below `low` stays there, and gets the value at `low`.
     """
     if not np.isfinite(low):
         return angle
@@ -239,12 +240,12 @@ def turned_back(angle: Array, low: float, high: float, turn: float = 360.0) -> A
 
 
 def middle_of_gap(low: float, high: float, turn: float = 360.0) -> float:
-    """Where the nearer end of low ... high changes, between `high` and the next turn of `low`; `high` without a gap."""
+    """Middle of the gap from `high` to the next turn of `low`, where the nearer end changes; `high` without a gap."""
     return max(high, (high + low + turn) / 2)
 
 
 def with_lags(poses: Poses, signals: Iterable[Signal]) -> Poses:
-    """The poses with the lagged signals worked out, over all of them at once and in order of time."""
+    """The poses with the values of lagged signals, which are computed over all poses in order of time."""
     late = {signal.lagged_name: signal for signal in signals if signal.constant_s}
     if not late:
         return poses
@@ -254,7 +255,7 @@ def with_lags(poses: Poses, signals: Iterable[Signal]) -> Poses:
 
 
 def lagged(values: Array, time_s: Array, constant_s: float) -> Array:
-    """A signal after a first-order lag, taken as straight between samples and as settled before the first one.
+    """A signal after a first-order lag; it is taken as linear between samples, and as settled before the first one.
 
     values, time_s  same shape; the samples may come in any order of time
     constant_s      time constant, s

@@ -1,11 +1,11 @@
-"""Where the bodies of axes are along a path, on a machine with play.
+"""Backlash along a path: where the moved bodies of axes are between the two sides of their play.
 
-As an axis turns round its body stays, until the axis has gone as far as the play; then it follows. That goes on from
-turn to turn: a corrected program takes up the play in a step of some micrometres, and turns axes round by less than it
-all the time, as it corrects.
+When an axis reverses, its body stays until the axis has moved by the play; then it follows. The state is carried from
+reversal to reversal: a corrected program takes up the play in a step of some micrometres, and its corrections reverse
+axes by less than the play all the time.
 
-Errors that change as an axis turns round, and are no play of its own, change at once. Seen from a corrected text alone,
-such an axis turns round where its rounded numbers do; so close to a turn both sides are possible.
+Errors that depend on the direction of an axis but are no play along it change at once at a reversal. Seen from the
+corrected text alone, such an axis reverses where its rounded numbers do; close to a reversal both sides are possible.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from ncfix.machine import State
 from ncfix.values import frozen
 
 LATERAL = 1e-5
-"""mm or rad: an axis with less play is off across its way, if at all, where it turns round."""
+"""Play along an axis, mm or rad, below which a change at its reversal counts as no play."""
 
 
 @frozen
 class Runs:
-    """An axis along a path: k runs in order; on each it goes one way, or rests.
+    """The k runs of an axis along a path, in order; in each run it moves in one direction, or rests.
 
-    begin  (k,) where each begins: the number of a begin or end of a leg, counted in turn
-    place  (k,) where that is: the row of the motion, and how far it is done
-    q      (k,) where the axis is there, mm or rad
-    size   (k,) how far it goes, mm or rad
-    way    (k,) the way in which it goes
-    lost   (k,) how far it has to go until its play is taken up; 0 without play
-    side   (k,) where its body is between the sides of the play as the run begins, -1 to 1
+    begin  (k,) where the run begins: number of the leg's begin (2 i) or end (2 i + 1), i the leg
+    place  (k,) the same as row of the motion plus fraction of it
+    q      (k,) position of the axis there, mm or rad
+    size   (k,) way of the axis in the run, mm or rad
+    way    (k,) direction of the axis in the run, -1, 0 or 1
+    lost   (k,) lost motion: way until the play is taken up after a reversal, mm or rad; 0 without play
+    side   (k,) place of the body between the sides of the play at the begin of the run, -1 to 1
     """
 
     begin: Index
@@ -48,20 +48,20 @@ class Runs:
     side: Array
 
     def at(self, rows: Index, fraction: Array) -> Index:
-        """The runs in which fractions of motions (n,) are, (n,); where two meet, the one of that motion."""
+        """(n,) the runs at fractions (n,) of motions `rows` (n,); where two runs meet, the one of that motion."""
         place = rows + fraction
         after = np.where(fraction == 0, np.searchsorted(self.place, place, "right"), np.searchsorted(self.place, place))
         return np.maximum(after - 1, 0)
 
     def sides(self, run: Index, q: Array) -> Array:
-        """Where the body is with the axis at positions (n,) of runs (n,), (n,) -1 to 1."""
+        """(n,) place of the body between the sides of the play, -1 to 1, at axis positions q (n,) of runs (n,)."""
         lost, way = self.lost[run], self.way[run]
         followed = self.side[run] + 2 * way * np.abs(q - self.q[run]) / np.where(lost > 0, lost, np.inf)
         return np.where(lost > 0, np.clip(followed, -1.0, 1.0), way)
 
     @property
     def takes_up(self) -> tuple[Index, Array]:
-        """Runs (n,) in which play is taken up, and how far the axis has gone there, (n,) mm or rad."""
+        """(n,) the runs in which the play is fully taken up, and (n,) the way of the axis until then, mm or rad."""
         needed = self.lost * (1 - self.way * self.side) / 2
         run = np.flatnonzero((self.way != 0) & (needed > REST) & (needed < self.size - REST))
         return run, needed[run]
@@ -69,15 +69,15 @@ class Runs:
 
 @frozen
 class BacklashBodies:
-    """The bodies of the axes on which errors depend on the direction, along a program.
+    """The bodies of all axes with direction-dependent errors, along a program.
 
-    A leg is a stretch of a motion that cuts, or all of a motion of another sort.
+    A leg is a stretch of a motion that cuts, or the whole of any other motion.
 
-    stretches  of the program
-    legs       k of them, in order
-    own        (k,) which stretch each is; -1: none
-    q          (2, k, n_axes) where the axes are as legs begin and end, mm and rad
-    first      (n_axes,) where the bodies are as the first begins, -1 to 1
+    stretches  the stretches of the motions that cut
+    legs       all k legs, in order
+    own        (k,) the stretch that a leg is; -1: none
+    q          (2, k, n_axes) axis positions at the begins and ends of legs, mm and rad
+    first      (n_axes,) places of the bodies between the sides of the play at the first begin, -1 to 1
     runs       column of an axis -> its runs
     """
 
@@ -91,7 +91,7 @@ class BacklashBodies:
 
     @classmethod
     def of(cls, intent: Intent, stretches: Stretches, first: Array | None) -> BacklashBodies:
-        """Along the stretches of a program; `first` as above, 0 where that is not known."""
+        """The bodies along the stretches of a program; `first` (n_axes,) as above, None: 0, not known."""
         legs, own = _legs(intent, stretches)
         q = np.stack([intent.joints_at(legs.rows, each) for each in (legs.start, legs.stop)])
         known = np.flatnonzero(finite(q[0]) & finite(q[1]))
@@ -102,12 +102,12 @@ class BacklashBodies:
         return bodies
 
     def came(self, row: int) -> Signs:
-        """(n_axes,) the way in which each axis came to the begin of a motion."""
+        """(n_axes,) direction in which each axis came to the start of motion `row`."""
         assert self.intent.came is not None
         return self.intent.came[row]
 
     def _runs(self, axis: int) -> Runs:
-        places = self.q[:, :, axis].T.ravel()  # begin and end of each leg in turn: between two, it may have moved, too
+        places = self.q[:, :, axis].T.ravel()  # begin and end of each leg in turn; it may also move between legs
         ways = carried(np.append(self.came(0)[axis], signs(np.diff(places)))[:, None])[1:, 0]
         begin = np.flatnonzero(np.diff(ways, prepend=2))
         q, way, legs = places[begin], ways[begin], self.legs
@@ -118,7 +118,7 @@ class BacklashBodies:
         return Runs(begin, place, q, size, way, lost, self._followed(way, size, lost, axis))
 
     def _followed(self, way: Signs, size: Array, lost: Array, axis: int) -> Array:
-        """Where a body is as runs (k,) begin, (k,)."""
+        """(k,) places of a body, -1 to 1, at the begins of runs (k,)."""
         sides, side = np.empty(len(way)), float(self.first[axis])
         far = np.where(lost > 0, 2 * size / np.where(lost > 0, lost, 1.0), 2.0) * way
         for run, to in enumerate(far.tolist()):
@@ -127,29 +127,29 @@ class BacklashBodies:
         return sides
 
     def _lost(self, begin: Index, axis: int, way: Signs) -> Array:
-        """How far an axis goes from begins or ends of legs (m,) until play is taken up, (m,) mm or rad.
+        """(m,) lost motion of an axis at begins or ends of legs (m,), mm or rad; `way` (m,): its direction there.
 
-        0 where the body is ahead of the axis on both ways, as no play does: a control may that takes up too much.
+        0 if the body is ahead of the axis in both directions. That is no play, but a control that overcompensates it.
         """
         q, leg = self.q[begin % 2, begin // 2], (begin + 1) // 2
         rows, inside = self.legs.rows[leg], (self.legs.start[leg] + self.legs.stop[leg]) / 2
-        here, there = (self.tip_on_side(rows, inside, q, axis, each) for each in (way, -way))
+        following, opposite = (self.tip_on_side(rows, inside, q, axis, each) for each in (way, -way))
         along = self.intent.machine.axis_jacobian(q, self.intent.lengths(rows))[:, :3, axis]
         square = np.einsum("ki,ki->k", along, along)
-        ahead = np.einsum("ki,ki->k", along, there - here) * way / np.where(square > 0, square, np.inf)
+        ahead = np.einsum("ki,ki->k", along, opposite - following) * way / np.where(square > 0, square, np.inf)
         return np.where(ahead > LATERAL, ahead, 0.0)
 
-    # -- what follows from it -----------------------------------------------------------------------------------------
+    # -- the tip with backlash ----------------------------------------------------------------------------------------
 
     def divided(self) -> Stretches:
-        """The stretches, also divided where play has been taken up."""
+        """The stretches, divided also at the places where the play of an axis has been taken up."""
         places = [self._taken_up(axis) for axis in self.runs]
         if not any(len(which) for which, _ in places):
             return self.stretches
         return self.stretches.divided(*map(np.concatenate, zip(*places, strict=True)))
 
     def _taken_up(self, axis: int) -> tuple[Index, Array]:
-        """Where the play of an axis has been taken up: stretches (m,), and the fractions of their motions."""
+        """(m,) stretches in which the play of an axis has been taken up, and the fractions of their motions there."""
         runs, places = self.runs[axis], self.q[:, :, axis].T.ravel()
         gone = np.cumsum(np.abs(np.diff(places, prepend=places[:1])))
         run, far = runs.takes_up
@@ -160,7 +160,7 @@ class BacklashBodies:
         return self.own[leg[inside]], self._reaching(leg[inside], axis, target[inside])
 
     def _reaching(self, which: Index, axis: int, target: Array) -> Array:
-        """The fractions of motions at which, in legs (m,), an axis is at positions (m,), (m,)."""
+        """(m,) the fractions of motions at which an axis reaches positions `target` (m,) in legs `which` (m,)."""
         legs, (begin, end) = self.legs, self.q[:, which, axis]
         low, high = legs.start[which], legs.stop[which]
         share = (target - begin) / np.where(end != begin, end - begin, 1.0)
@@ -176,23 +176,23 @@ class BacklashBodies:
         return found
 
     def tip(self, rows: Index, fraction: Array) -> Array:
-        """Where the tip is at fractions of motions done as programmed, with the bodies where they are, (k, 3) mm."""
+        """(k, 3) actual tip at fractions of motions, mm, with the bodies at their places between the sides."""
         q, states = self.intent.joints_at(rows, fraction), self.intent.states(rows, fraction)
-        here: Array = self.intent.machine.actual_tip(q, states)
-        tip, ways = here.copy(), np.asarray(states.direction)
+        on_side: Array = self.intent.machine.actual_tip(q, states)
+        tip, ways = on_side.copy(), np.asarray(states.direction)
         for axis, runs in self.runs.items():
             way, run = ways[:, axis], runs.at(rows, fraction)
             away = np.where(runs.lost[run] > 0, np.abs(way - runs.sides(run, q[:, axis])) / 2, 0.0)
             which = np.flatnonzero(away * way)
             if which.size:
                 other = self.tip_on_side(rows[which], fraction[which], q[which], axis, -way[which])
-                tip[which] += away[which, None] * (other - here[which])
+                tip[which] += away[which, None] * (other - on_side[which])
         return tip
 
     def tip_on_side(self, rows: Index, fraction: Array, q: Array, axis: int, side: Signs) -> Array:
-        """Where the tip is at positions (k, n_axes), with an axis on a side of its play (k,), (k, 3) mm.
+        """(k, 3) actual tip at axis positions q (k, n_axes), mm, with `axis` on `side` (k,) of its play.
 
-        All other axes are on the sides that they have at fractions of motions.
+        All other axes are on the sides that they have at `fraction` (k,) of motions `rows` (k,).
         """
         states = self.intent.states(rows, fraction)
         ways = np.array(states.direction)
@@ -200,17 +200,17 @@ class BacklashBodies:
         return self.intent.machine.actual_tip(q, State(states.tool_length, ways, states.inputs))
 
     def before(self, row: int) -> Array:
-        """Where the bodies are as a motion begins, (n_axes,)."""
-        found, leg = self.first.copy(), int(np.searchsorted(self.legs.rows, row))
+        """(n_axes,) places of the bodies, -1 to 1, at the start of motion `row`."""
+        sides, leg = self.first.copy(), int(np.searchsorted(self.legs.rows, row))
         at = np.array([min(2 * leg, 2 * len(self.legs.rows) - 1)])
         for axis, runs in self.runs.items():
             run = np.maximum(np.searchsorted(runs.begin, at) - 1, 0)
-            found[axis] = runs.sides(run, self.q[at % 2, at // 2, axis])[0] if leg else self.first[axis]
-        return found
+            sides[axis] = runs.sides(run, self.q[at % 2, at // 2, axis])[0] if leg else self.first[axis]
+        return sides
 
 
 def _legs(intent: Intent, stretches: Stretches) -> tuple[Stretches, Index]:
-    """The legs of a program, and which stretch each is; -1: none."""
+    """The legs of a program, and (k,) the stretch that each is; -1: none."""
     along = np.flatnonzero(stretches.stop > stretches.start)
     other = finite(intent.moves.start) & finite(intent.moves.end)
     other[stretches.rows[along]] = False
@@ -224,45 +224,46 @@ def _legs(intent: Intent, stretches: Stretches) -> tuple[Stretches, Index]:
 
 
 NEAR = 0.01
-"""mm or rad; so close to its turn an axis may be on either side."""
+"""Distance of an axis from its reversal, mm or rad, within which it may be on either side."""
 WINDOW = 24
-"""Samples on both sides of a turn that are looked at."""
+"""Number of samples on each side of a reversal that are examined."""
 
 
 @frozen
 class Flank:
-    """A path of k parabolas, and where the tip may be besides: as each begins, half-way, as it ends.
+    """The other possible place of the tip near reversals, on a path of k parabolas.
 
-    aside  (k, 3, 3) mm: to the other side, of axes that turn just there and have no play to take up; 0 of others
+    aside  (k, 3, 3) vector, mm, from the tip to its place with the reversing axes on their other side, at the begin,
+           middle and end of each parabola; 0 away from reversals, and for axes with play to take up
     """
 
     aside: NDArray[np.float32]
 
     @classmethod
     def of(cls, bodies: BacklashBodies, actual: Curve) -> Flank:
-        """Of a path on the real machine."""
+        """The other places of the tip along the path `actual` of the real machine."""
         at, aside = CurvePoints.of(actual), np.zeros((len(actual), 3, 3), dtype=np.float32)
         rows, place = actual.rows[at.piece], (2 * at.share).astype(np.intp)
         fraction = (1 - at.share) * actual.start[at.piece] + at.share * actual.stop[at.piece]
         q = bodies.intent.joints_at(rows, fraction)
-        for axis, runs in bodies.runs.items() if len(rows) else ():  # of a path that cuts
+        for axis, runs in bodies.runs.items() if len(rows) else ():
             which = _near(runs, rows + fraction, q[:, axis])
-            here = (rows[which], fraction[which], q[which], axis)
+            near = (rows[which], fraction[which], q[which], axis)
             way = bodies.intent.direction(rows[which], fraction[which])[:, axis]
-            aside[at.piece[which], place[which]] += bodies.tip_on_side(*here, -way) - bodies.tip_on_side(*here, way)
+            aside[at.piece[which], place[which]] += bodies.tip_on_side(*near, -way) - bodies.tip_on_side(*near, way)
         joined = np.flatnonzero(~actual.opens[1:]) + 1
         aside[joined, 0] = aside[joined - 1, 2]
         return cls(aside)
 
     def there(self, search: Search, path: Curve, samples: CurvePoints, found: Nearest) -> Array:
-        """The gaps (k,) from samples of what is made, on the side on which it is nearer, to what is meant."""
+        """(k,) the gaps from samples of the actual path, on the side that is nearer, to the intended one, mm."""
         return self._lessened(search, samples.points, found, path, (samples.piece, samples.share), 1.0)
 
     def back(self, search: Search, points: Array, found: Nearest) -> Array:
-        """The gaps (k,) from points (k, 3) of what is meant to what is made, on the side on which it is nearer."""
+        """(k,) the gaps from points (k, 3) of the intended path to the actual one, on the side that is nearer, mm."""
         gap = self._lessened(search, points, found, search.curve, (found.piece, found.share), -1.0)
         far = np.flatnonzero(gap > search.near)
-        if far.size:  # of a place beside it
+        if far.size:  # try the neighbouring parabolas, too
             for way in (-1, 1):
                 piece = np.clip(found.piece[far] + way, 0, len(self.aside) - 1)
                 where = piece, np.full(len(far), 0.5 - way / 2)
@@ -273,7 +274,10 @@ class Flank:
     def _lessened(
         self, search: Search, points: Array, found: Nearest, path: Curve, where: tuple[Index, Array], sense: float
     ) -> Array:
-        """The gaps (k,) from points (k, 3) to a curve, or to it moved as a path may be at shares of parabolas."""
+        """(k,) the gaps from points (k, 3) to the curve, or to it moved by `sense` times `aside`, if smaller, mm.
+
+        path, where  the path with the reversals, and (k,) its parabolas and shares of them at the points
+        """
         (piece, share), gap = where, found.gap.copy()
         sample = np.rint(2 * share).astype(np.intp)
         aside = sense * self.aside[piece, sample].astype(np.float64)
@@ -287,7 +291,11 @@ class Flank:
 
 
 def _near(runs: Runs, place: Array, q: Array) -> Index:
-    """Of samples (k,) in order, at places of a program, with an axis at positions, those close to where it turns."""
+    """The samples (k,) at which an axis without play is close to one of its reversals.
+
+    place  (k,) row of the motion plus fraction of it, ascending
+    q      (k,) position of the axis, mm or rad
+    """
     turns = np.flatnonzero((runs.side != runs.way) & (runs.lost == 0))
     last = np.searchsorted(place, runs.place[turns], side="right") - 1
     around = np.clip(last[:, None] + np.arange(1 - WINDOW, WINDOW + 1), 0, len(q) - 1)

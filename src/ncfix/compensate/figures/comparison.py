@@ -1,16 +1,16 @@
-"""Two programs on one machine, compared while they are read: does the second one cut what the first one means?
+"""Comparison of two programs on one machine while they are read: does the second one cut what the first one means?
 
-The paths are compared as curves in the workpiece, so this knows nothing of how the second program was made: from every
-sample of the real path of the second program to the nearest point of the intended path of the first, and back, so that
-nothing may be missing. Nearest is looked for near the same length of path, so that the next pass of a cut, a hair's
-breadth beside it, is not taken for the one that is meant.
+The paths are compared as curves in the workpiece, without knowledge of how the second program was made: from every
+sample of the actual path of the second program to the nearest point of the intended path of the first, and back, so
+that no cut may be missing. The nearest point is searched near the same length of path, so that a neighbouring pass of
+the same cut is not taken for the matching one.
 
-    original --> what it means ----------------+--> there: from what the other makes to what is meant
-             --> what the machine makes of it  |    back:  from what is meant to what the other makes
-    other    --> what the machine makes of it -+    before: from what the original makes to what it means
+    original --> intended path --+--> there:  from the actual path of the other to the intended path
+             --> actual path     |    back:   from the intended path to the actual path of the other
+    other    --> actual path ----+    before: from the actual path of the original to the intended path
 
-Of every path as much is kept as a nearest point may lie on. If that is not enough, `NearestNotHereError` is raised, and
-both programs have to be at hand as a whole.
+Of every path, only the part is held on which a nearest point may lie. If that is not enough, `NearestNotHereError` is
+raised, and both programs have to be read as a whole.
 """
 
 from __future__ import annotations
@@ -43,21 +43,21 @@ from ncfix.text.tree import Program
 from ncfix.values import frozen, mutable
 
 BESIDE = 64
-"""Motions on both sides of one that are looked at to find out whether an axis turns round near it."""
+"""Number of motions before and behind a motion that are examined for reversals of axes near it."""
 
 
 @frozen
 class CutPath:
-    """What a part of a program cuts; motions are called by their lines.
+    """The path that a part of a program cuts. `rows` of its curves are lines.
 
-    actual    what the machine makes of it
-    intended  what it means; None of a program of which that does not matter
-    flank     where the tip is besides, with the play of axes, if there is any
-    unseen    why motions at feed are not looked at -> their lines, one for each
-    left      linear axis -> lines of motions that cannot be corrected along it
-    last      nothing comes after it
-    rounding  how far the tip may be off because numbers are rounded to the control's digits, mm
-    bodies    where the bodies of axes with play are meanwhile, if there is any
+    actual    the path on the real machine
+    intended  the path on a perfect machine; None if it is not needed
+    flank     the other possible places of the tip near reversals; None if no error depends on direction
+    unseen    reason why feeds, arcs and holes are not examined -> their lines, one for each
+    left      letter of a linear axis -> lines of motions that cannot be corrected along it
+    last      whether it is the last part
+    rounding  largest tip error by rounding to the control's digits, mm
+    bodies    the bodies of axes with play; None if no error depends on direction
     """
 
     actual: Curve
@@ -73,10 +73,11 @@ class CutPath:
     def of(
         cls, intent: Intent, lines: Index, rows: slice, last: bool, meant: bool, first: Array | None = None
     ) -> CutPath:
-        """Of motions, of which some `rows` count and others stand before and behind them; `meant`: with what they mean.
+        """The path of motions `rows` of a program; motions before and behind them are only examined for reversals.
 
-        lines  (n,) those of the motions
-        first  (n_axes,) where the bodies of axes are before them, see `BacklashBodies`
+        lines  (n,) lines of all motions
+        meant  with the intended path
+        first  (n_axes,) places of the bodies of axes before all motions, see `BacklashBodies`
         """
 
         def counted(curve: Curve) -> slice:
@@ -104,18 +105,18 @@ class CutPath:
 
 
 def whole(machine: Machine, program: Program, moves: Moves, meant: bool = False) -> Iterator[CutPath]:
-    """What a program cuts, at once."""
+    """The path that a whole program cuts, as one part."""
     yield CutPath.of(Intent(machine, moves, State()), program.lines(moves.block), slice(None), True, meant)
 
 
 @frozen
 class PartEnd:
-    """The last motions of a part, where it matters which way axes go next.
+    """The last motions of a part. The path of the last `BESIDE` is made with the next part, for reversals behind them.
 
-    moves      up to twice `BESIDE`; the last `BESIDE` count when the next part is known
-    lines      (n,) those in which they are
-    direction  the way in which the axes came to the first of them
-    sides      (n_axes,) where their bodies are there
+    moves      up to twice `BESIDE` motions
+    lines      (n,) their lines
+    direction  (n_axes,) direction in which the axes came to the start of the first of them
+    sides      (n_axes,) places of the bodies there, see `BacklashBodies`
     """
 
     moves: Moves
@@ -125,7 +126,7 @@ class PartEnd:
 
     @classmethod
     def behind(cls, bodies: BacklashBodies, lines: Index) -> PartEnd:
-        """The end of motions in lines (n,)."""
+        """The end of the motions of `bodies`; `lines` (n,): their lines."""
         start, moves = max(len(lines) - 2 * BESIDE, 0), bodies.intent.moves
         last = motions_taken(moves, np.arange(start, len(lines)))
         return cls(last, lines[start:], bodies.came(start), bodies.before(start))
@@ -133,11 +134,11 @@ class PartEnd:
 
 @frozen
 class CutPaths:
-    """What a program cuts, part after part while it is read.
+    """The path that a program cuts, part after part while it is read.
 
-    read   gives the next so many bytes of the text; none at its end
-    meant  with what it means
-    said   what there is to say of following it, once the last part is there
+    read   returns the next `size` bytes of the text; no bytes at its end
+    meant  with the intended path
+    said   messages from following the program, filled with the last part
     """
 
     task: Task
@@ -146,7 +147,7 @@ class CutPaths:
     said: list[Message] = field(default_factory=list)
 
     def __iter__(self) -> Iterator[CutPath]:
-        """The parts. Raises what reading and following do, and UsageError for what is not given."""
+        """The parts. Raises what reading and following raise, and UsageError for values that the setup lacks."""
         task = self.task
         parts = MachineParts.of(task, self.read)
         machine = parts.set_up
@@ -167,7 +168,7 @@ class CutPaths:
 
 
 def _with(around: PartEnd | None, machine: Machine, moves: Moves, lines: Index) -> tuple[Intent, Index, int]:
-    """Motions behind those before them, the lines of all, and how many of them have been counted."""
+    """The last motions of the part before with those of a part, the lines of all, and the number already compared."""
     if around is None:
         return Intent(machine, moves, State()), lines, 0
     both = joined_moves([around.moves, moves], [0, 0])
@@ -177,21 +178,22 @@ def _with(around: PartEnd | None, machine: Machine, moves: Moves, lines: Index) 
 
 
 UNLIKE = 0.02
-"""Paths whose lengths differ by more than this share are not the same cut."""
+"""Difference of the lengths of two paths, as a share, above which they are not the same cut."""
 AT_HAND = 100.0
-"""mm of path before and behind a place that are at hand: enough for whatever is less than 2 mm off."""
+"""Length of path, mm, that is held before and behind a place: enough for all deviations below 2 mm."""
 GROUP = 2048
-"""Parabolas from which one looks together, counted from where the path begins: the same however it is read."""
+"""Number of parabolas that are compared together. Groups are counted from the begin of the path, so that the result
+does not depend on the parts in which it is read."""
 
 
 @mutable
 class Track:
-    """What is at hand of a path.
+    """The held part of a path.
 
-    dropped   parabolas before it
-    complete  nothing comes behind it
-    cut       the length of all that was cut, mm
-    flank     where the tip may be besides, as axes turn round, if that matters
+    dropped   number of parabolas before it that were dropped
+    complete  it reaches to the end of the path
+    cut       length of all cuts so far, mm
+    flank     the other possible places of the tip near reversals; None if no error depends on direction
     """
 
     curve: Curve
@@ -202,31 +204,31 @@ class Track:
 
     @classmethod
     def empty(cls) -> Track:
-        """Of a path that begins."""
+        """A path at its begin."""
         none = np.zeros(0)
         places = np.zeros((0, 3))
         return cls(Curve(np.zeros(0, dtype=np.intp), none, none, places, places, places, np.zeros(0, dtype=bool), none))
 
     @property
     def count(self) -> int:
-        """Parabolas so far."""
+        """Number of parabolas so far."""
         return self.dropped + len(self.curve)
 
     @property
     def reached(self) -> float:
-        """The way along the whole path to where it ends now, mm."""
+        """The length of the whole path so far, mm."""
         curve = self.curve
         return float(curve.lengths[-1] + curve.ways[-1]) if len(curve) else curve.first
 
     def add(self, more: Curve, last: bool, flank: Flank | None = None) -> None:
-        """Go on along the path; `last`: to its end."""
+        """Add the next stretch of the path; `last`: it ends with it."""
         self.complete = last
         self.cut += more.total
         self.curve = self.curve.and_then(more)
         self.flank = flank if self.flank is None or flank is None else stacked([self.flank, flank])
 
     def drop(self, before: float) -> None:
-        """Forget what lies before a way along the path."""
+        """Drop the parabolas that end before the length `before` of the path, mm."""
         curve = self.curve
         count = int(np.searchsorted(curve.lengths + curve.ways, before))
         if count:
@@ -235,12 +237,12 @@ class Track:
             self.dropped += count
 
     def joined(self, at: int) -> float:
-        """The length of a parabola at hand that begins where the one before ends, mm; 0 if there is none."""
+        """The length of held parabola `at`, mm; 0 if there is none, or a gap before it."""
         curve = self.curve
         return float(curve.ways[at]) if at < len(curve) and not curve.opens[at] else 0.0
 
     def part(self, start: int, stop: int) -> Curve:
-        """Some parabolas of what is at hand."""
+        """The held parabolas from `start` up to `stop`."""
         curve = self.curve
         first = float(curve.lengths[start]) if start < len(curve) else self.reached
         return replace(curve.taken(slice(start, stop)), first=first)
@@ -248,12 +250,13 @@ class Track:
 
 @mutable
 class Match:
-    """Looks from one path to another for what is nearest, as far as both are at hand.
+    """The distances from one path to the nearest points of another, as far as both are held.
 
-    near   as `Search` has it
-    done   parabolas of the path that have been looked at
-    ahead  how much farther one is along the other path at the end of these, mm
-    last   where the other path, its parabolas counted from its begin, is nearest to that end
+    near   distance below which a place need not be the nearest one, mm, see `Search`
+    along  the distances so far, as errors along the path
+    done   number of parabolas of the path that have been compared
+    ahead  length of the other path minus that of the path at the end of these, mm
+    last   the nearest place of the other path to that end, its parabolas counted from the begin of that path
     """
 
     path: Track
@@ -265,20 +268,20 @@ class Match:
     last: Nearest | None = None
 
     def go_on(self) -> None:
-        """Look from as much of the path as there is enough of the other for, by whole groups but at its end."""
+        """Compare as much of the path as enough of the other is held for; in whole groups, except at its end."""
         curve, other = self.path.curve, self.other
         start, stop = self.done - self.path.dropped, len(curve)
         if not other.complete:
             stop = int(np.searchsorted(curve.lengths + curve.ways, other.reached - self.ahead - 2 * AT_HAND))
         if stop < len(curve) or not self.path.complete:
-            stop = min(stop, len(curve) - 1)  # what goes on at its end is to be known
+            stop = min(stop, len(curve) - 1)  # the next parabola must be known
             stop -= (stop - start) % GROUP
         if stop > start and len(other.curve):
             self.done += stop - start
             self._look(start, stop)
 
     def _look(self, start: int, stop: int) -> None:
-        """Look from some parabolas of what is at hand."""
+        """Compare the held parabolas from `start` up to `stop`."""
         part, other, flank = self.path.part(start, stop), self.other, self.path.flank
         samples = CurvePoints.of(part, self.path.joined(stop))
         search = Search(other.curve, self.near, self.ahead, other.dropped == 0, other.complete)
@@ -300,23 +303,25 @@ class Match:
 
     @property
     def looked_at(self) -> float:
-        """The way along its path up to which it has looked."""
+        """The length of the path up to which it has been compared, mm."""
         curve, start = self.path.curve, self.done - self.path.dropped
         return float(curve.lengths[start]) if start < len(curve) else self.path.reached
 
     @property
     def first_needed(self) -> float:
-        """The way along the other path before which nothing of it will be looked at any more."""
+        """The length of the other path before which it is not needed any more, mm."""
         return self.looked_at + self.ahead - 2 * AT_HAND
 
 
 @mutable
 class RunningComparison:
-    """Two programs on their way, and what was found so far.
+    """The comparison of two programs while they are read.
 
-    tolerance    of the path before rounding, mm
-    rounding     what the control's digits may add to it, mm; arcs that are met make it more
-    unseen, left as `CutPath` has them, of the original, by parts; `blind`: what is unseen of the other
+    tolerance  tolerance of the path before rounding, mm
+    rounding   largest tip error by rounding to the control's digits, mm; arcs may raise it
+    unseen     reason why motions of the original are not examined -> their lines, by parts
+    blind      the same of the other program: reason -> number of motions
+    left       letter of a linear axis -> lines of the original that cannot be corrected along it, by parts
     """
 
     tolerance: float
@@ -338,16 +343,20 @@ class RunningComparison:
 
     @property
     def limit(self) -> float:
-        """How far the tip may be off, mm."""
+        """Largest permitted distance of the tip from the intended path, mm."""
         return self.tolerance + self.rounding
 
     @property
     def no_figure(self) -> Counter[NoFigureReason]:
-        """How many motions at feed are not looked at, and why: of the program that has more of them."""
+        """Number of feeds, arcs and holes that are not examined, by reason: the larger one of both programs."""
         return Counter({why: sum(map(len, parts)) for why, parts in self.unseen.items()}) | self.blind
 
     def run(self, original: Iterator[CutPath], other: Iterator[CutPath]) -> None:
-        """Go along both programs. Raises what reading them does, `NearestNotHereError`, `DifferenceError` NCF420."""
+        """Compare both programs to their end.
+
+        Raises what reading them raises, `NearestNotHereError`, and `DifferenceError` NCF420 if they cut different
+        lengths of path.
+        """
         while not (self.intended.complete and self.fixed.complete):
             behind = self.intended.reached <= self.fixed.reached
             if self.fixed.complete or (behind and not self.intended.complete):

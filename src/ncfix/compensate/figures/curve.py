@@ -1,6 +1,6 @@
-"""The path of a tool tip as a curve: parabolas through three of its points each, near enough to it everywhere.
+"""The path of a tool tip as a curve of parabolas, each through three of its points.
 
-Motions are divided into stretches so short that a parabola is near enough to the path of the tip on each.
+Motions are divided into stretches so short that a parabola fits the path of the tip on each of them.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ from ncfix.control.moves import MotionKind
 from ncfix.values import frozen
 
 ROUND, TWISTED = 1e-6, 2e-5
-"""mm; so far a parabola may be from a circle on which the tip goes, and from a path on which it goes on besides."""
+"""Largest deviation, mm, of a parabola from a circle of the tip, and from a circle with further motion added to it."""
 QUARTIC, CUBIC = 1 / 512, 3**0.5 / 72
-"""A parabola through begin, middle and end of an arc of angle a and radius r is r a^4 / 512 from it, along it up to
-r a^3 sqrt(3) / 216, which does not matter. A way b besides, by another axis, adds no more than b a^2 sqrt(3) / 72: the
-third derivative of a point that turns and is moved is -a^2 times the first, and at most 3 a^2 b."""
+"""A parabola through begin, middle and end of an arc of angle a and radius r deviates from it by r a^4 / 512; its error
+along the arc, up to r a^3 sqrt(3) / 216, does not matter. A further way b by another axis adds at most b a^2 sqrt(3) /
+72: the third derivative of a point that turns and moves is -a^2 times the first, and at most 3 a^2 b."""
 JUMP = 1e-6
-"""Fraction of a motion on both sides of a kink or jump of the errors where a parabola ends."""
+"""Fraction of a motion between a kink or jump of the errors and the ends of the parabolas before and behind it."""
 
 
 @frozen
 class Stretches:
-    """Of the motions of a program that cut, k stretches in order.
+    """The k stretches, in order, into which the motions of a program that cut are divided.
 
     rows         (k,) the motion
-    start, stop  (k,) the fractions of it from which to which each goes
-    opens        (k,) it may begin elsewhere than the one before ends
+    start, stop  (k,) the fractions of the motion at which the stretch begins and ends
+    opens        (k,) the stretch may begin elsewhere than the one before it ends
     """
 
     rows: Index
@@ -57,7 +57,7 @@ class Stretches:
 
     @classmethod
     def of(cls, intent: Intent) -> Stretches:
-        """Of a program."""
+        """The stretches of all motions of a program that cut."""
         moves = intent.moves
         known = finite(moves.end) & moves.cutting & ~at_measured_places(moves)
         hole = moves.kind == MotionKind.CYCLE
@@ -81,7 +81,7 @@ class Stretches:
         return cls(rows, start, np.concatenate([ends, ones])[order], _opening(intent, rows, start))
 
     def divided(self, which: Index, fraction: Array) -> Stretches:
-        """These, some of them (m,) divided at fractions (m,) of their motions."""
+        """The stretches, with stretches `which` (m,) divided at fractions (m,) of their motions."""
         inside = np.flatnonzero((fraction > self.start[which]) & (fraction < self.stop[which]))
         owner = np.concatenate([np.arange(len(self.rows)), which[inside]])
         start = np.concatenate([self.start, fraction[inside]])
@@ -94,13 +94,13 @@ class Stretches:
 
 
 def _with_ends(counts: Index, between: Array) -> tuple[Index, Array]:
-    """Fractions inside of motions and those of both ends: counts (k,), and flat."""
+    """Flat fractions inside motions with both ends added: counts (k,), and fractions."""
     each = np.arange(len(counts))
     return merged(len(counts), (owners(counts), between), (each, np.zeros(len(counts))), (each, np.ones(len(counts))))
 
 
 def _evenly(intent: Intent, rows: Index) -> tuple[Index, Array]:
-    """Fractions between which parabolas are near enough to the path: counts (k,) and flat fractions, ends left out."""
+    """Even fractions between which parabolas fit the path: counts (k,) and flat fractions, without the ends."""
     often = bends(intent, rows)
     often[DENSITY * often >= MOST] = 0.0
     counts = np.maximum(np.ceil(DENSITY / 2 * often), _round_axes(intent, rows))
@@ -109,7 +109,7 @@ def _evenly(intent: Intent, rows: Index) -> tuple[Index, Array]:
 
 
 def _round_axes(intent: Intent, rows: Index) -> Array:
-    """How many parabolas it takes for motions (k,) that lead the tip round an axis, (k,)."""
+    """(k,) number of parabolas that are needed for the turns of the tip in motions `rows` (k,)."""
     moves, machine = intent.moves, intent.machine
     angle, radius, besides = (np.zeros(len(rows)) for _ in range(3))
     way = picked(moves.end, rows) - picked(moves.start, rows)
@@ -133,7 +133,7 @@ def _round_axes(intent: Intent, rows: Index) -> Array:
 
 
 def _opening(intent: Intent, rows: Index, start: Array) -> Mask:
-    """(k,) stretches of motions that may begin elsewhere than the one before ends."""
+    """(k,) whether a stretch may begin elsewhere than the one before it ends."""
     opens: Mask = start == 0
     opens |= intent.moves.kind[rows] == MotionKind.CYCLE
     if not len(rows) or intent.arrival is not None:
@@ -151,19 +151,19 @@ def _opening(intent: Intent, rows: Index, start: Array) -> Mask:
 Tip = Callable[[Index, Array], Array]
 
 ROUNDING = 1e-9
-"""mm: what begins no farther from where the one before ends begins there."""
+"""Gap, mm, up to which a parabola begins where the one before it ends."""
 
 
 @frozen(slots=False)
 class Curve:
-    """k parabolas in the order in which they are gone along; a hole is one that has no length.
+    """A path as k parabolas in order. A drilled hole is a parabola of length 0.
 
-    rows                (k,) the motion that each belongs to
-    start, stop         (k,) the fractions of the motion from which to which it goes
-    begin, middle, end  (k, 3) mm: where it begins, half-way, and ends
-    opens               (k,) it does not begin where the one before ends
-    ways                (k,) mm, how long it is
-    first               mm, the way along the whole path to the first of them
+    rows                (k,) the motion of each parabola
+    start, stop         (k,) the fractions of the motion at which it begins and ends
+    begin, middle, end  (k, 3) its points at parameter 0, 0.5 and 1, mm
+    opens               (k,) it does not begin where the one before it ends
+    ways                (k,) its length, mm
+    first               the length of the whole path up to the first parabola, mm
     """
 
     rows: Index
@@ -178,7 +178,7 @@ class Curve:
 
     @classmethod
     def through(cls, stretches: Stretches, tip: Tip) -> Curve:
-        """Along stretches of motions, by a function that gives the tip; where it has none is left out."""
+        """The curve along stretches of motions; stretches at which `tip` returns NaN are left out."""
         rows, start, stop = stretches.rows, stretches.start, stretches.stop
         fresh = np.flatnonzero(stretches.opens)
         at = np.concatenate([rows, rows, rows[fresh]])
@@ -200,7 +200,7 @@ class Curve:
 
     @cached_property
     def gaps(self) -> Array:
-        """The way from the end of the one before to its begin, (k,) mm."""
+        """(k,) the gap between the end of the parabola before and the begin of each, mm."""
         gaps = np.zeros(len(self))
         at = np.flatnonzero(self.opens[1:]) + 1
         gaps[at] = distance(self.end[at - 1], self.begin[at])
@@ -208,17 +208,17 @@ class Curve:
 
     @cached_property
     def lengths(self) -> Array:
-        """The way to the begin of each, straight over what lies between cuts, (k,) mm."""
+        """(k,) the length of the path up to the begin of each parabola, with straight lines over gaps, mm."""
         return self.first + np.cumsum(self.ways + self.gaps) - self.ways
 
     @property
     def total(self) -> float:
-        """The length of what is cut, mm."""
+        """The length of all parabolas, without gaps, mm."""
         return float(self.ways.sum())
 
     @cached_property
     def slope(self) -> Array:
-        """(k, 3) mm: how the point at share u of a parabola moves with u where it begins."""
+        """(k, 3) derivative of the point by the parameter u at the begin of each parabola, mm; see `bend`."""
         return 4 * self.middle - 3 * self.begin - self.end
 
     @cached_property
@@ -228,7 +228,7 @@ class Curve:
 
     @cached_property
     def turns(self) -> Array:
-        """How much the path has turned, from below, where each begins and where it ends, (2, k) rad."""
+        """(2, k) lower bound of the turn of the path up to the begin, and up to the end, of each parabola, rad."""
         enters, leaves = _unit(self.slope), _unit(self.slope + 2 * self.bend)
         inside = distance(enters, leaves)
         corner = np.zeros(len(self))
@@ -243,29 +243,29 @@ class Curve:
 
     @cached_property
     def lying(self) -> Index:
-        """The pieces that have a length, ascending."""
+        """The numbers of the parabolas with a length above 0, ascending."""
         return np.flatnonzero(self.ways > 0)
 
     @cached_property
     def upto(self) -> Index:
-        """How many have a length up to each and with it, (k,)."""
+        """(k,) the number of parabolas with a length up to and including each."""
         return np.cumsum(self.ways > 0)
 
     def place(self, lengths: Array) -> Index:
-        """The parabola in which a way along the path (n,) mm ends, (n,)."""
+        """(n,) the parabola at lengths (n,) of the path, mm."""
         return np.maximum(np.searchsorted(self.lengths, lengths, side="right") - 1, 0)
 
     def way(self, piece: Index, share: Array) -> Array:
-        """The way along the path to shares (n,) of parabolas (n,), mm."""
+        """(n,) the length of the path up to shares (n,) of parabolas `piece` (n,), mm."""
         return self.lengths[piece] + share * self.ways[piece]
 
     def point(self, piece: Index, share: Array) -> Array:
-        """The points at shares (n,) of parabolas (n,), (n, 3) mm."""
+        """(n, 3) the points at shares (n,) of parabolas `piece` (n,), mm."""
         at = share[:, None]
         return self.begin[piece] + at * (self.slope[piece] + at * self.bend[piece])
 
     def and_then(self, other: Curve) -> Curve:
-        """This path, and then another one."""
+        """This path, continued by another one."""
         both = {name: np.concatenate([getattr(each, name) for each in (self, other)]) for name in COLUMNS}
         curve: Curve = replace(self, **cast(Any, both))
         if len(self) and len(other):
@@ -273,22 +273,22 @@ class Curve:
         return curve
 
     def taken(self, which: Mask | slice) -> Curve:
-        """Some of the parabolas."""
+        """The parabolas `which`."""
         return replace(self, **{name: getattr(self, name)[which] for name in COLUMNS})
 
 
 COLUMNS = [each.name for each in fields(Curve) if each.name != "first"]
-"""The fields of a curve that have a row for each parabola."""
+"""The fields of a curve with a row for each parabola."""
 
 
 @frozen
 class CurvePoints:
-    """Points of a curve at which it is looked at: half-way and at the end of each parabola, and where a cut begins.
+    """Sample points of a curve: the middle and the end of each parabola, and the start of each cut.
 
     piece   (k,) the parabola, ascending
-    share   (k,) 0, 0.5 or 1
+    share   (k,) its parameter: 0, 0.5 or 1
     points  (k, 3) mm
-    weight  (k,) mm of the path that it stands for, by Simpson's rule
+    weight  (k,) the length of path for which it stands, mm, by Simpson's rule
     """
 
     piece: Index
@@ -298,7 +298,7 @@ class CurvePoints:
 
     @classmethod
     def of(cls, curve: Curve, after: float = 0.0) -> CurvePoints:
-        """Of a curve, at the end of which another parabola goes on that is so long, mm."""
+        """The sample points of a curve; `after`: length, mm, of the parabola that continues it (0: none)."""
         hole = curve.ways == 0
         counts = np.where(hole, 1, 2 + curve.opens)
         piece = owners(counts)
@@ -315,22 +315,22 @@ class CurvePoints:
 
 
 def arc_lengths(begin: Array, middle: Array, end: Array) -> Array:
-    """Of parabolas through points (k, 3), (k,) mm: by Simpson's rule, as it were, from one chord and from two."""
+    """(k,) lengths of parabolas through points (k, 3), mm, extrapolated from one chord and from two chords."""
     halves = distance(begin, middle) + distance(middle, end)
     return (4 * halves - distance(begin, end)) / 3
 
 
 def distance(one: Array, other: Array) -> Array:
-    """How far points (n, 3) are from others, (n,)."""
+    """(n,) distances between points (n, 3)."""
     return length(one - other)
 
 
 def length(vectors: Array) -> Array:
-    """The lengths of vectors (n, 3), (n,)."""
+    """(n,) lengths of vectors (n, 3)."""
     return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
 
 
 def _unit(vectors: Array) -> Array:
-    """Vectors (n, 3) of length 1; those without length stay."""
+    """(n, 3) the vectors divided by their lengths; zero vectors stay."""
     size = length(vectors)
     return vectors / np.where(size > 0, size, 1.0)[:, None]

@@ -1,16 +1,16 @@
-"""The nearest point of a curve, looked for near the same length of path.
+"""The nearest point of a curve, searched near the same length of path.
 
-A point of another path is followed down to where it is nearest, from where this path is as long as that one is there.
-Where that is farther away than is of no interest, and the path turns so much near by that it might come back nearer to
-the point, all of it is looked at that could be nearer.
+For a point of another path, the search starts where this path has the same length, and descends to the nearest point.
+If that is farther away than the tolerance, and the path turns so much nearby that it might come back nearer to the
+point, all of the path that could be nearer is examined.
 
-Between the samples of a path more are taken in two cases:
+Between the samples of a path further samples are taken in two cases:
 
-- Where it goes on over a hole of the other one, between two cuts of it, however short that is. A straight cut is looked
-  at where it begins, half-way and where it ends; a hole in between is not seen there.
-- Where it may be too far from the other one between two places at which it is near enough. The distance changes by no
-  more than the way, and has a peak where the nearest point leaps along the other path. The way between two such places
-  is halved until one is found that is too far, or until there can be none.
+- The path passes a gap of the other path, between two of its cuts, however short the gap is. A straight cut is sampled
+  at its begin, middle and end, and a gap in between would be missed.
+- The path may be too far from the other one between two samples that are near enough. The distance changes by at most
+  the way, and has a peak where the nearest point leaps along the other path. The way between two such samples is halved
+  until a place is found that is too far, or until there can be none.
 """
 
 from __future__ import annotations
@@ -27,35 +27,36 @@ from ncfix.control.trace import NotInPartsError
 from ncfix.values import frozen, mutable
 
 ALONG = 0.02
-"""A point that is so much shorter or longer along the path counts as this share of that farther away."""
+"""Weight of a difference of lengths along the path: it counts as this share of a distance."""
 STEPS = 6
-"""Most Newton steps on a parabola; each squares what is missing."""
+"""Largest number of Newton steps on a parabola; each squares the error."""
 CLOSE = 1e-6
-"""mm: a step along the path that makes no difference to the distance."""
+"""Step along the path, mm, that makes no difference to the distance."""
 HOPS = 40
-"""Most parabolas on which a nearest point is looked for one after the other."""
+"""Largest number of parabolas on which a nearest point is searched in succession."""
 STRAIGHT = 0.1
-"""rad: a path that turns by less leads no nearer to a point than 1 - cos of it, half a per cent, of its distance."""
+"""Turn of a path, rad, below which it leads no nearer to a point: the gain is at most 1 - cos, half a per cent."""
 INSIDE = 1e-6
-"""Share of a parabola: from its end another nearest point may be found than from the begin of the next one."""
+"""Distance from the ends of a parabola, as a share of it, because the search from its end may find another point than
+that from the begin of the next one."""
 SUDDEN = 0.5
-"""mm by which one path is longer than the other on the way of these: there is something wrong, and it is looked for."""
+"""Sudden change of the difference of lengths, mm, at which a group of points is divided to find its place."""
 FEWEST = 16
-"""Points for which the difference is taken as the same at last."""
+"""Least number of points in half of a group that is divided."""
 PAIRS = 1 << 18
-"""Points and parabolas that are looked at together."""
+"""Number of pairs of points and parabolas worked on at a time."""
 
 
 class NearestNotHereError(NotInPartsError):
-    """The nearest point may lie on a part of the path that is not at hand."""
+    """The nearest point may lie on a part of the path that is not held."""
 
 
 @frozen
 class Nearest:
-    """Where a curve is nearest to points.
+    """The nearest places of a curve to n points.
 
-    piece  (n,) the parabola, and `share` (n,) of it
-    gap    (n,) mm
+    piece  (n,) the parabola; `share` (n,): its parameter
+    gap    (n,) the distance from the point, mm
     """
 
     piece: Index
@@ -63,26 +64,26 @@ class Nearest:
     gap: Array
 
     def shifted(self, by: int) -> Nearest:
-        """These places, with the parabolas counted from elsewhere."""
+        """The same places, with `by` added to the numbers of the parabolas."""
         return replace(self, piece=self.piece + by)
 
     def way(self, curve: Curve) -> Array:
-        """The ways along the curve to there, (n,) mm; so far inside of the parabolas that rounding shows no others."""
+        """(n,) the lengths of the curve up to these places, mm, kept slightly inside the parabolas (`INSIDE`)."""
         return curve.way(self.piece, np.clip(self.share, INSIDE, 1 - INSIDE))
 
     def put(self, which: Index, other: Nearest) -> None:
-        """Take for some of the points what is there instead."""
+        """Replace the places of points `which` by those of `other`."""
         self.piece[which], self.share[which], self.gap[which] = other.piece, other.share, other.gap
 
 
 @mutable
 class Search:
-    """Looks for the nearest points of a curve.
+    """Searches the nearest places of a curve to points of another path.
 
-    curve   the curve, or the part of it that is at hand
-    near    mm; of distances below nobody needs to know whether another point is nearer
-    ahead   how much farther one is along the curve than along the other path, mm, by what was found last
-    begins, ends  there is nothing before the part at hand, or behind it
+    curve   the curve, or the held part of it
+    near    distance, mm, below which a found place need not be the nearest one
+    ahead   length along the curve minus length along the other path, mm, at the latest points
+    begins, ends  the held part begins, or ends, with the whole curve
     """
 
     curve: Curve
@@ -92,17 +93,19 @@ class Search:
     ends: bool = True
 
     def all(self, points: Array, lengths: Array, groups: Index) -> Nearest:
-        """For points (n, 3) of another path, in order, at lengths (n,) of it. Raises `NearestNotHereError`.
+        """The nearest places to points (n, 3) of another path, in order, at lengths (n,) of it, mm.
 
-        groups  where others begin for which the difference of the two lengths of path is taken as the same, at first
+        groups  indices at which groups of points begin; in a group, one difference of the two lengths is assumed first
+
+        Raises `NearestNotHereError`.
         """
         parts = zip(np.split(points, groups), np.split(lengths, groups), strict=True)
         return stacked([each for part in parts for each in self._together(*part)])
 
     def _together(self, points: Array, lengths: Array) -> list[Nearest]:
-        """For points of a short way; of ever shorter ones where one path suddenly is longer than the other.
+        """The nearest places to a group of points, which is divided if the difference of lengths changes suddenly.
 
-        How much longer it is, is seen at the last of them that is near enough, or at the nearest one if none is.
+        The new difference is taken from the last point that is near enough, or from the nearest one if none is.
         """
         found, half = self.around(points, lengths + self.ahead, lengths), len(points) // 2
         sure = np.flatnonzero(found.gap[half:] <= self.near)
@@ -114,11 +117,11 @@ class Search:
         return [found]
 
     def around(self, points: Array, expected: Array, lengths: Array | None = None) -> Nearest:
-        """For points (n, 3), near the lengths (n,) of the curve at which they are expected.
+        """The nearest places to points (n, 3), searched near the lengths `expected` (n,) of the curve, mm.
+
+        lengths  (n,) lengths of the other path up to the points, mm, if they are in order along it
 
         Raises `NearestNotHereError`.
-
-        lengths  (n,) of the other path to the points, if they are in order along it
         """
         found = self._downhill(points, expected)
         far = np.flatnonzero(found.gap > self.near)
@@ -131,9 +134,9 @@ class Search:
         return found
 
     def _beside(self, expected: Array, lengths: Array, found: Nearest) -> Array:
-        """The lengths (n,) at which points are expected by what is near enough to those before and behind them.
+        """(n,) the expected lengths, mm, interpolated from points before and behind that have a place near enough.
 
-        One path gets longer than the other with every step that takes up play.
+        The difference of lengths changes with every step that takes up play.
         """
         ahead = self.curve.way(found.piece, found.share) - lengths
         sure = np.flatnonzero((found.gap <= self.near) & (np.abs(ahead - self.ahead) <= SUDDEN))
@@ -146,7 +149,7 @@ class Search:
         return down(np.ascontiguousarray(points.T), expected)
 
     def _down(self, points: Array, expected: Array) -> Nearest:
-        """The nearest points that are reached without going away from `points` (3, n)."""
+        """The places that are reached from the expected ones by descending towards `points` (3, n)."""
         piece, lying = self.curve.place(expected), self.curve.lying
         size = self.curve.ways[piece]
         share = np.clip((expected - self.curve.lengths[piece]) / np.where(size > 0, size, 1.0), 0.0, 1.0)
@@ -169,7 +172,7 @@ class Search:
         return found
 
     def _down_compiled(self, points: Array, expected: Array) -> Nearest:
-        """As `_down`."""
+        """Like `_down`, compiled."""
         from ncfix.core import nearest
 
         n, path = len(expected), self.curve
@@ -180,13 +183,13 @@ class Search:
         return found
 
     def _at_gap(self, piece: Index, share: Array) -> Array:
-        """1 where a cut ends, -1 where one begins, 0 elsewhere, (n,)."""
+        """(n,) 1 at the end of a cut, -1 at the begin of one, 0 elsewhere."""
         opens = self.curve.opens
         ends = (share == 1) & opens.take(piece + 1, mode="clip")
         return 1.0 * ends - ((share == 0) & opens[piece])
 
     def _hop(self, piece: Index, push: Array, one: Mask) -> Index:
-        """Where to look next: as far along as the point lies, or on the very next parabola that has a length."""
+        """(n,) the parabola to try next: the one `push` mm farther or, with `one`, the next one that has a length."""
         curve = self.curve
         ahead, size = push > 0, curve.ways[piece]
         end = curve.lengths[piece] + np.where(ahead, size, 0.0)
@@ -195,10 +198,10 @@ class Search:
         at = np.where(ahead, np.maximum(at, after), np.minimum(at, after - (size > 0) - 1))
         return curve.lying[np.clip(at, 0, len(curve.lying) - 1)]
 
-    # -- where the path turns -----------------------------------------------------------------------------------------
+    # -- exhaustive search where the path turns -----------------------------------------------------------------------
 
     def _everywhere(self, points: Array, expected: Array, found: Nearest, far: Index) -> None:
-        """Look at all that could be nearer to points `far` (k,) than what was found, where the path turns near by."""
+        """Examine all parabolas that could be nearer to points `far` (k,) than `found`, if the path turns nearby."""
         curve, (low, high) = self.curve, self._range(expected, found, far)
         first, last = curve.place(low), curve.place(high)
         first, last = np.minimum(first, found.piece[far]), np.maximum(last, found.piece[far])
@@ -210,23 +213,23 @@ class Search:
             raise NearestNotHereError
 
     def _range(self, expected: Array, found: Nearest, which: Index) -> tuple[Array, Array]:
-        """The ways along the curve between which there may be a nearer point, (k,) mm."""
+        """(k,) the lengths of the curve, mm, between which a nearer place may lie."""
         way = self._cost(expected, found, which) / ALONG
         return expected[which] - way, expected[which] + way
 
     def _cost(self, expected: Array, found: Nearest, which: Index) -> Array:
-        """The measure in which a point is nearest, mm: its distance, and how far it is from where it was expected."""
+        """(k,) the measure that is minimised, mm: the distance combined with the deviation from the expected length."""
         off = self.curve.way(found.piece[which], found.share[which]) - expected[which]
         return np.hypot(found.gap[which], ALONG * off)
 
     def _lacks(self, low: Array, high: Array) -> bool:
-        """Whether some of these ways along the curve are not at hand."""
+        """Whether some of these lengths of the curve, mm, lie outside the held part."""
         curve = self.curve
         before = not self.begins and low.min() < curve.lengths[0]
         return bool(before or (not self.ends and high.max() > curve.lengths[-1] + curve.ways[-1]))
 
     def _among(self, points: Array, expected: Array, found: Nearest, rows: Index, where: tuple[Index, Index]) -> None:
-        """Look at runs of parabolas for points `rows` (k,): the first of each, and how many."""
+        """Examine runs of parabolas for points `rows` (k,); `where`: the first parabola and the length of each run."""
         (first, counts), cost = where, self._cost(expected, found, rows)
         owner, piece = owners(counts), ranges(first, counts)
         share, least = _on_chords(self.curve, picked(points, rows[owner]), piece)
@@ -243,10 +246,10 @@ class Search:
 
 
 def _newton(curve: Curve, points: Array, piece: Index, share: Array) -> tuple[Array, Array, Array]:
-    """The nearest points to `points` (3, n) on parabolas (n,), from shares (n,) of them.
+    """The nearest places to `points` (3, n) on parabolas `piece` (n,), by Newton steps from shares (n,).
 
-    Returns the shares, the distances, and how far beyond their ends the way to the points goes on: mm, negative before
-    their begin, 0 if it ends on them.
+    Returns the shares, the distances, mm, and how far the foot of the point lies beyond the end, mm: negative before
+    the begin, 0 if it is on the parabola.
     """
     begin, slope, bend = curve.parabolas.take(piece, axis=1).reshape(3, 3, -1)
     points = points - begin
@@ -266,12 +269,12 @@ def _newton(curve: Curve, points: Array, piece: Index, share: Array) -> tuple[Ar
 
 
 def _dot(one: Array, other: Array) -> Array:
-    """The products (n,) of vectors (3, n)."""
+    """(n,) scalar products of vectors (3, n)."""
     return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 def _on_chords(curve: Curve, points: Array, piece: Index) -> tuple[Array, Array]:
-    """The shares of the chords of parabolas (n,) that are nearest to points (n, 3), and how near these are at most."""
+    """(n,) shares of the chords of parabolas nearest to points (n, 3), and lower bounds of the distances, mm."""
     begin = picked(curve.begin, piece)
     chord, gap = picked(curve.end, piece) - begin, points - begin
     square = np.einsum("ij,ij->i", chord, chord)
@@ -282,10 +285,10 @@ def _on_chords(curve: Curve, points: Array, piece: Index) -> tuple[Array, Array]
 def over_holes(
     search: Search, path: Curve, samples: CurvePoints, before: Index, found: Nearest
 ) -> tuple[CurvePoints, Nearest]:
-    """More samples of a path, where it goes over holes of the other one, and what is nearest to them.
+    """Further samples of a path where it passes gaps of the other one, and the nearest places to them.
 
-    samples, found  (n,) those that there are
-    before  (n,) the parabola of the other one that is nearest to the place before each sample
+    samples, found  (n,) the samples so far, and the nearest places to them
+    before          (n,) the parabola of the other path that is nearest to the sample before each
     """
     rows, middles = _crossed(search, samples, before, found.piece)
     piece, share = samples.piece[rows], _shares_beside(path, samples, rows, middles)
@@ -296,7 +299,7 @@ def over_holes(
 
 
 def _crossed(search: Search, samples: CurvePoints, before: Index, behind: Index) -> tuple[Index, Array]:
-    """Samples (k,) before which holes are gone over, from parabolas (n,) to others (n,), and the middles (k, 3)."""
+    """(k,) samples before which gaps are passed, from parabolas `before` to `behind` (n,), and (k, 3) gap centres."""
     curve = search.curve
     holes = np.flatnonzero(curve.gaps > search.near)
     passed = np.searchsorted(holes, np.stack([before, behind]), side="right")
@@ -308,7 +311,7 @@ def _crossed(search: Search, samples: CurvePoints, before: Index, behind: Index)
 
 
 def _shares_beside(path: Curve, samples: CurvePoints, rows: Index, points: Array) -> Array:
-    """The shares of the parabolas that are beside points (k, 3), in the half of each before a sample (k,)."""
+    """(k,) the shares of parabolas beside points (k, 3), in the half of each parabola before samples `rows` (k,)."""
     piece, share = samples.piece[rows], samples.share[rows]
     begin = path.point(piece, share - 0.5)
     chord = samples.points[rows] - begin
@@ -318,16 +321,16 @@ def _shares_beside(path: Curve, samples: CurvePoints, rows: Index, points: Array
 
 
 HALVINGS = 24
-"""How often a way is halved at most: to some nanometres of the longest."""
+"""Largest number of times that an interval is halved: to some nanometres of the longest one."""
 
 
 @frozen
 class NearestInterval:
-    """Ways (n,) along parabolas, and what is nearest to where they begin and end.
+    """n intervals of parabolas, and the nearest places of the other path to their ends.
 
     piece             (n,) the parabola
-    low, high         (n,) the shares of it from which to which they go
-    before, behind    what is nearest to both ends
+    low, high         (n,) the shares of it at which the interval begins and ends
+    before, behind    the nearest places to the begin, and to the end
     """
 
     piece: Index
@@ -337,7 +340,7 @@ class NearestInterval:
     behind: Nearest
 
     def leaping(self, search: Search, path: Curve) -> NearestInterval:
-        """The intervals on which there may be a peak beyond what is near enough."""
+        """The intervals on which the distance may have a peak above `near`."""
         way, near = path.ways[self.piece] * (self.high - self.low), search.near
         begin, end = (search.curve.way(each.piece, each.share) for each in (self.before, self.behind))
         within = (self.before.gap <= near) & (self.behind.gap <= near)
@@ -345,7 +348,7 @@ class NearestInterval:
         return taken(self, np.flatnonzero(peaks & (np.abs(end - begin - way) > near)))
 
     def middle(self, search: Search, path: Curve) -> Nearest:
-        """What is nearest to the middle of each: seen from the begin or from the end, whichever is nearer."""
+        """The nearest place to the middle of each interval, searched from its begin and from its end."""
         points = path.point(self.piece, (self.low + self.high) / 2)
         half = path.ways[self.piece] * (self.high - self.low) / 2
         found, other = (
@@ -357,7 +360,7 @@ class NearestInterval:
         return found
 
     def halves(self, middle: Nearest) -> NearestInterval:
-        """Both halves of each, by what is nearest to its middle."""
+        """Both halves of each interval; `middle`: the nearest places to the middles."""
         half = (self.low + self.high) / 2
         return stacked([replace(self, high=half, behind=middle), replace(self, low=half, before=middle)])
 
@@ -365,19 +368,19 @@ class NearestInterval:
 def over_peaks(
     search: Search, path: Curve, samples: CurvePoints, before: Nearest, found: Nearest
 ) -> Iterator[tuple[CurvePoints, Nearest]]:
-    """More samples of a path, where there are peaks between those that there are, and what is nearest to them.
+    """Further samples of a path where the distance may have peaks between samples, and the nearest places to them.
 
-    samples, found  (n,) those that there are
-    before          (n,) what is nearest to the place before each sample
+    samples, found  (n,) the samples so far, and the nearest places to them
+    before          (n,) the nearest place to the sample before each
     """
     joined = np.flatnonzero((samples.share > 0) & (path.ways[samples.piece] > 0))
     share = samples.share[joined]
-    left = NearestInterval(samples.piece[joined], share - 0.5, share, taken(before, joined), taken(found, joined))
+    intervals = NearestInterval(samples.piece[joined], share - 0.5, share, taken(before, joined), taken(found, joined))
     for _ in range(HALVINGS):
-        left = left.leaping(search, path)
-        if not len(left.piece):
+        intervals = intervals.leaping(search, path)
+        if not len(intervals.piece):
             return
-        half = (left.low + left.high) / 2
-        middle = left.middle(search, path)
-        yield CurvePoints(left.piece, half, path.point(left.piece, half), np.zeros(len(half))), middle
-        left = left.halves(middle)
+        half = (intervals.low + intervals.high) / 2
+        middle = intervals.middle(search, path)
+        yield CurvePoints(intervals.piece, half, path.point(intervals.piece, half), np.zeros(len(half))), middle
+        intervals = intervals.halves(middle)

@@ -1,9 +1,9 @@
-"""The path of a program as a page shows it: where the tip should be, how far it is off before and after, and why.
+"""Record of the path of a corrected program for a picture: intended tip, error before and after, and reasons.
 
-A record takes what a correction has planned and written, part after part (`take`), and keeps the places of the path
-that a picture needs. Of a long program these are a selection: of every stretch the largest error before and after,
-then, again and again, the places that are farthest from the lines drawn so far. How far the picture then leaves the
-path is measured, and stands in the result. Figures, histogram and lists are of all places, not of the selection.
+A record takes the plan and text of each part in turn (`take`), and keeps the places of the path that a picture needs.
+For a long program these are a selection: the largest errors before and after of every stretch, and then, repeatedly,
+the places that are farthest from the lines drawn so far. The deviation of the picture from the path is measured, and is
+part of the result. Figures, histogram and lists are of all places, not of the selection.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ from ncfix.text.tree import Program
 from ncfix.values import frozen, mutable
 
 CUT, RAPID, REFUSED, PASSED = range(4)
-"""What leads to a place: a corrected cut, a rapid, a refused motion, one passed by rule."""
+"""The kind of motion that leads to a place: a corrected cut, a rapid, a refused motion, one passed by rule."""
 DRAWN = 12_000
-"""So many places are drawn at most, about."""
+"""Approximate largest number of places in a picture."""
 HELD = 2_000_000
-"""From so many places on, those in memory are thinned."""
+"""Number of places in memory above which they are thinned."""
 STEP = np.radians(7.5)
-"""An arc, or a turn of a rotary axis, is drawn in steps of this angle at most."""
+"""Largest step, rad, in which an arc or a turn of a rotary axis is drawn."""
 MOST_STEPS = 400
 LISTED = 500
-"""So many blocks of a list are kept; all are counted."""
+"""Largest number of blocks in a list."""
 WORST = 40
-"""So many lines with the largest errors are kept."""
+"""Number of lines with the largest errors that are kept."""
 ROUNDS = 10
 FINE = 1e-3
-"""mm; places that are no farther off the lines that are drawn need not be drawn."""
+"""Distance, mm, from the drawn lines up to which a place need not be drawn."""
 EDGES = np.logspace(-4, 4, 97)
-"""Bins of the histogram, um: twelve a decade."""
+"""Edges of the bins of the histogram, um: twelve per decade."""
 COLUMNS = {"x": "f4", "y": "f4", "z": "f4", "way": "f4", "before": "f4", "after": "f4", "line": "i4", "kind": "u1"}
 
 
 @frozen
 class ListedPlace:
-    """A place of the path that a list names: line, way along the path and tip (mm), error before and after (um)."""
+    """A place of the path: line, way along the path, mm, tip, mm, error before and after, um."""
 
     line: int
     way: float
@@ -58,7 +58,7 @@ class ListedPlace:
 
 @frozen
 class ListedBlock:
-    """A block that stayed as it was, why, and where its motion ends; None: nobody knows."""
+    """A block that stayed unchanged, the reason, and the place at which its motion ends; None: not known."""
 
     line: int
     reason: str
@@ -74,7 +74,7 @@ class Extent:
     line: int = 0
 
     def with_more(self, values: Array, lines: Index) -> Extent:
-        """With those (k,) of more motions."""
+        """The extent with the corrections (k,) of more motions, in lines (k,)."""
         if not len(values):
             return self
         most = int(np.argmax(np.abs(values)))
@@ -85,15 +85,16 @@ class Extent:
 
 @mutable
 class PathRecord:
-    """What is kept of a path; call `take` with each part in turn, then read `columns()` and the rest.
+    """The record of a path: call `take` with each part in turn, then read `columns()` and the fields.
 
-    way        mm along the path so far
-    total      places that were looked at
-    share      (2, 96) mm of path by error before and after, in bins between EDGES
-    worst      places with the largest errors after, one a line
-    corrections  of the axes, by name
-    linear     the size of X, Y and Z together
-    refused, passed   blocks that stayed as they were, the first of each
+    drawn        approximate largest number of places in the picture
+    way          length of the path so far, mm
+    total        number of sampled places
+    share        (2, 96) length of path by error before and after, mm, in bins between EDGES
+    worst        the places with the largest errors after the correction, one for each line
+    corrections  letter of an axis -> its corrections
+    linear       the norm of the corrections of the linear axes
+    refused, passed  blocks that stayed unchanged, the first `LISTED` of each
     """
 
     drawn: int = DRAWN
@@ -110,7 +111,7 @@ class PathRecord:
     _strays: float = 0.0
 
     def take(self, program: Program, solution: WrittenPlan, own: Mask | None = None) -> None:
-        """Take in a part; of its motions those that are `own` (n,) if given."""
+        """Add a part; `own` (n,): the motions to include, None: all."""
         moves = solution.moves
         mine = np.ones(len(moves), dtype=bool) if own is None else own
         lines = program.lines(moves.block)
@@ -197,7 +198,7 @@ class PathRecord:
         return columns, np.concatenate([shift for _, shift in self._parts])
 
     def _thin(self, most: int) -> None:
-        """Keep so many places, and note how far the picture then leaves the path."""
+        """Keep `most` places, and add the deviation of the picture from the path to `_strays`."""
         values, shift = self._together()
         self._parts, self._held = [(values, shift)], len(shift)
         if len(shift) <= most:
@@ -209,15 +210,15 @@ class PathRecord:
         self._held = len(rows)
 
     def columns(self) -> tuple[dict[str, Array], Array, float]:
-        """The places to be drawn by columns, as COLUMNS has them; the corrections (k, n_axes) at the ends of the
-        motions there, mm and rad; how far straight lines between these places leave those between all at most, mm.
+        """The places to draw, as columns (`COLUMNS`); (k, n_axes) the corrections at the ends of the motions there, mm
+        and rad; and the largest deviation of straight lines between these places from the path, mm.
         """
         self._thin(self.drawn)
         values, shift = self._together()
         return values, shift, self._strays
 
     def in_lines(self, lines: Sequence[int]) -> None:
-        """Say the lines of another text instead: `lines` has those of each line here."""
+        """Replace the line numbers by those of another text: `lines` has the new number for each line."""
         table = np.array([0, *lines], dtype=np.int64)
 
         def at(line: int) -> int:
@@ -241,7 +242,14 @@ class PathRecord:
 
 @frozen
 class _Places:
-    """Places in the order of the path: motion, tip (k, 3), errors and way (mm); `lifted`: over a hole."""
+    """Places in the order of the path.
+
+    move           (k,) the motion
+    tip            (k, 3) intended tip, mm
+    before, after  (k,) tip errors, mm
+    weight         (k,) way for which the place stands, mm
+    lifted         (k,) the place is over a hole, at its level R
+    """
 
     move: Index
     tip: Array
@@ -252,7 +260,7 @@ class _Places:
 
     @classmethod
     def of(cls, solution: WrittenPlan, mine: Mask) -> _Places:
-        """The places at which figures look, and some more where the way is bent."""
+        """The samples of the figures, with more places on arcs and turns; `mine` (n,): the motions to include."""
         written, intent = solution.written, solution.intent
         which = np.flatnonzero(mine[written.pieces.move])
         piece, fraction = _bent(written, which)
@@ -275,7 +283,7 @@ class _Places:
 
 
 def _bent(written: WrittenPieces, which: Index) -> tuple[Index, Array]:
-    """Pieces and fractions at which a picture of arcs and turns needs a place, without their ends; where cuts begin."""
+    """Pieces and fractions that a picture needs besides ends: places inside arcs and turns, and the begins of cuts."""
     moves, segments, move = written.intent.moves, written.segments, written.pieces.move[which]
     turned = np.abs(picked(segments.end, which) - picked(segments.start, which))[:, moves.rotary].max(
         axis=1, initial=0.0
@@ -299,7 +307,7 @@ def _spot(values: Mapping[str, Array], row: int) -> ListedPlace:
 
 
 def selection(values: Mapping[str, Array], most: int) -> Index:
-    """Places that stand for all, about `most` (k,): see the head of this module."""
+    """(k,) about `most` places that represent all places: see the module's docstring."""
     count = len(values["way"])
     changes = np.flatnonzero(np.diff(values["kind"]) != 0)
     fixed = np.concatenate([[0, count - 1], changes, changes + 1])
@@ -321,14 +329,14 @@ def selection(values: Mapping[str, Array], most: int) -> Index:
 
 
 def _largest(values: Array, first: Index) -> Index:
-    """Where the largest value of each stretch is, the first of equal ones; stretches begin at `first`."""
+    """The index of the largest value in each stretch, the first of equal ones; stretches begin at `first`."""
     most = np.maximum.reduceat(values, first)
     at = np.flatnonzero(values == np.repeat(most, np.diff(np.append(first, len(values)))))
     return at[np.searchsorted(at, first)]
 
 
 def _off_lines(tips: Array, rows: Index) -> Array:
-    """How far all points are from the polyline through those in `rows`, mm."""
+    """The distance of every point from the polyline through the points `rows`, mm."""
     after = np.clip(np.searchsorted(rows, np.arange(len(tips))), 1, len(rows) - 1)
     begin = tips[rows[after - 1]]
     along = tips[rows[after]] - begin

@@ -1,8 +1,8 @@
-"""What a real machine does with a program: where its tool tip is along the whole path, and where it should be.
+"""Simulation of a program on the real machine: actual and intended tool tip along the whole path.
 
-Looked at are the motions that cut: feeds and arcs along their whole length, canned cycles at their end. Rapids are left
-out, because how a control moves between their ends is its own affair, and so are motions that are passed by rule. The
-machine may have a control that corrects by tables: then the tip is where it is with the tables active.
+Motions that cut are simulated: feeds and arcs along their whole length, canned cycles at their end. Rapids are left
+out, because controls differ in how they move between their ends; so are motions that are passed by rule. The control
+may correct by compensation tables; then the tip is that with the tables active.
 """
 
 from __future__ import annotations
@@ -32,12 +32,14 @@ from ncfix.values import frozen, mutable
 
 @mutable
 class SimulatedErrors:
-    """Errors along a path; of as many parts as there may be, the same.
+    """Tip errors along a path. The result does not depend on how the path is divided into parts.
 
-    limit   mm; where the error is larger is noted; may become larger
-    max     mm; NaN once one is not known
-    where   the line of the largest
-    beyond  lines with errors beyond the limit, and the largest there, by parts; some twice
+    limit   error, mm, above which lines are noted in `beyond`; it may be raised later
+    max     largest error, mm; NaN once an error is not known
+    where   line of the largest error
+    squares, way          sum of squares times way, mm^3, and length of the path, mm
+    plain_squares, count  sum of squares, mm^2, and number of samples
+    beyond  for each part: lines with errors beyond the limit, and the largest error of each, mm; a line may recur
     """
 
     limit: float = np.inf
@@ -50,7 +52,7 @@ class SimulatedErrors:
     beyond: list[tuple[Index, Array]] = field(default_factory=list)
 
     def add(self, lines: Index, error: Array, weight: Array) -> None:
-        """Add errors (k,) mm in lines (k,), with the way (k,) that each stands for."""
+        """Add errors (k,), mm, in lines (k,), each with the way (k,), mm, for which it stands."""
         if not len(error):
             return
         worst = int(np.argmax(error))
@@ -69,26 +71,26 @@ class SimulatedErrors:
 
     @classmethod
     def of(cls, errors: Iterable[TipError]) -> SimulatedErrors:
-        """Of all samples of a path."""
+        """The errors of all samples of a path."""
         along = cls()
         deque(along.adding(errors), maxlen=0)
         return along
 
     def adding(self, errors: Iterable[TipError]) -> Iterator[TipError]:
-        """Add samples as they are asked for."""
+        """Pass the samples on, and add each."""
         for each in errors:
             self.add(each.lines, each.size, each.weight)
             yield each
 
     @property
     def rms(self) -> float:
-        """The root mean square along the path, mm; over the places where the path has no length."""
+        """The root mean square along the path, mm; over the samples if the path has no length."""
         if not self.count:
             return 0.0
         return float(np.sqrt(self.squares / self.way if self.way else self.plain_squares / self.count))
 
     def figures(self) -> dict[str, Any]:
-        """The error along the path in two figures, um, and the line of the worst; None where nothing was looked at."""
+        """The figures "max" and "rms", um, and the line "where" the error is largest; None without samples."""
         if not self.count:
             return {"max": None, "rms": None, "where": None}
         return {"max": 1e3 * self.max, "rms": 1e3 * self.rms, "where": self.where}
@@ -100,33 +102,33 @@ class SimulatedErrors:
 
 
 def lines_of(parts: list[Index]) -> list[int]:
-    """The lines that occur in parts, each once, in order."""
+    """The lines that occur in any of the parts, once each, in order."""
     return distinct(np.concatenate([np.zeros(0, dtype=np.intp), *parts])).tolist()
 
 
 def _added(total: float, values: Array) -> float:
-    """A total and values (k,), added one by one: in whatever parts they come, the sum is the same to the last bit."""
+    """A total plus values (k,), added one by one, so that the sum is the same to the last bit for any division."""
     return float(np.add.accumulate(np.concatenate([[total], values]))[-1])
 
 
 LEAST = 4
-"""Fewest samples between the ends of a motion."""
+"""Least number of samples between the ends of a motion."""
 BATCH = 200_000
-"""Samples worked on at a time."""
+"""Number of samples worked on at a time."""
 
 Tip = Callable[[Intent, Index, Array], Array]
-"""Motions (k,) and how far they are done (k,) -> where the tip is, (k, 3) mm."""
+"""(program, (k,) motions, (k,) fractions) -> (k, 3) tip, mm."""
 
 
 @frozen
 class TipError:
-    """The tool tip along a path, k samples in order.
+    """Actual and intended tool tip along a path, k samples in order.
 
-    rows      (k,) the motion that is done there
-    lines     (k,) the line in which it is
-    fraction  (k,) how far it is done
-    intended  (k, 3) where the tip should be, workpiece frame, mm
-    actual    (k, 3) where it is
+    rows      (k,) the motion
+    lines     (k,) the line of the motion
+    fraction  (k,) the fraction of the motion
+    intended  (k, 3) intended tip, workpiece frame, mm
+    actual    (k, 3) actual tip, workpiece frame, mm
     """
 
     rows: Index
@@ -137,28 +139,29 @@ class TipError:
 
     @classmethod
     def none(cls) -> TipError:
-        """Of a path without a sample."""
+        """A path without samples."""
         rows, places = np.zeros(0, dtype=np.intp), np.zeros((0, 3))
         return cls(rows, rows, np.zeros(0), places, places)
 
     @property
     def size(self) -> Array:
-        """The distance between the two, (k,) mm."""
+        """(k,) the distance between actual and intended tip, mm."""
         gap = self.actual - self.intended
         return np.sqrt(np.einsum("ij,ij->i", gap, gap))
 
     @property
     def weight(self) -> Array:
-        """The length of intended path that each sample stands for, (k,) mm."""
+        """(k,) the length of intended path for which each sample stands, mm."""
         step = np.linalg.norm(np.diff(self.intended, axis=0), axis=1) * (np.diff(self.rows) == 0)
         return (np.concatenate([[0.0], step]) + np.concatenate([step, [0.0]])) / 2
 
 
 def tip_errors(intent: Intent, lines: Index, first: int = 0, made: Tip | None = None) -> Iterator[TipError]:
-    """The error of a program as this machine runs it: against what a perfect one would do at the same instant.
+    """The tip errors of a program on this machine, against a perfect machine at the same fraction, in batches.
 
-    Of motions from row `first` on, in lines (n,), some at a time; tool lengths must be known. `made` gives the actual
-    tip, if it is not that of the machine alone.
+    lines  (n,) lines of the motions; tool lengths must be known
+    first  the row of the first motion to simulate
+    made   returns the actual tip, if it is not that of the machine alone
     """
     made = made or actual_tip
     for rows, fraction in samples(intent, first):
@@ -166,15 +169,15 @@ def tip_errors(intent: Intent, lines: Index, first: int = 0, made: Tip | None = 
 
 
 def tip_errors_of(program: Program, followed: Followed, made: Tip | None = None) -> Iterator[TipError]:
-    """As `tip_errors`, of a whole program that its machine has followed."""
+    """Like `tip_errors`, for a whole program that was followed on its machine."""
     moves = followed.trace.moves
     return tip_errors(Intent(followed.machine, moves, State()), program.lines(moves.block), made=made)
 
 
 def tip_errors_on(task: Task, read: Read, said: list[Message]) -> Iterator[TipError]:
-    """As `tip_errors`, of the text that is read; raises what following does, and `NotInPartsError`.
+    """Like `tip_errors`, for the text that `read` returns; raises what following raises, and `NotInPartsError`.
 
-    said  gets what there is to say of following it, at the end
+    said  the messages from following the program are added to it at the end
     """
     parts = MachineParts.of(task, read)
     for continued in parts:
@@ -188,7 +191,7 @@ def tip_errors_on(task: Task, read: Read, said: list[Message]) -> Iterator[TipEr
 
 
 def samples(intent: Intent, first: int = 0) -> Iterator[tuple[Index, Array]]:
-    """Where to look: motions and fractions, ends included, as densely as the error model may bend; some at a time."""
+    """Motions and fractions to sample, with their ends, as densely as the error model may bend; in batches."""
     moves = intent.moves
     known = np.isfinite(moves.end).all(axis=1) & moves.cutting
     known[:first] = False
@@ -201,7 +204,7 @@ def samples(intent: Intent, first: int = 0) -> Iterator[tuple[Index, Array]]:
 
 
 def _samples(intent: Intent, rows: Index, counts: Index) -> tuple[Index, Array]:
-    """Motions and fractions: of motions `rows` (k,) both ends, `counts` (k,) places between them, and kinks."""
+    """Motions and fractions: both ends of motions `rows` (k,), `counts` (k,) places between them, and kinks."""
     along = np.flatnonzero(intent.moves.kind[rows] != MotionKind.CYCLE)
     on, inside = rows[along], counts[along]
     inside, between = with_kinks(intent, intent.segments, on, inside, even(inside))
@@ -211,16 +214,16 @@ def _samples(intent: Intent, rows: Index, counts: Index) -> tuple[Index, Array]:
 
 
 def actual_tip(intent: Intent, rows: Index, fraction: Array) -> Array:
-    """Where the tip of the real machine is at fractions of motions done as programmed, (k, 3) mm."""
+    """(k, 3) tip of the real machine at fractions of motions, mm."""
     return intent.machine.actual_tip(intent.joints_at(rows, fraction), intent.states(rows, fraction))
 
 
 Correct = Callable[[Array, Array, float], Array]
-"""Positions of all axes (k, n_axes) [mm, rad], ways (k, n_axes), tool length [mm] -> what the control adds to them."""
+"""(positions (k, n_axes), mm and rad; directions (k, n_axes); tool length, mm) -> corrections (k, n_axes)."""
 
 
 def tip_with(correct: Correct) -> Tip:
-    """Where the tip of the real machine is with tables active: see `simulation.actual_tip`, which is without them."""
+    """The function like `actual_tip` for a control that adds the corrections of `correct`, such as those of tables."""
 
     def tip(intent: Intent, rows: Index, fraction: Array) -> Array:
         q, states = intent.joints_at(rows, fraction), intent.states(rows, fraction)
@@ -236,7 +239,7 @@ def tip_with(correct: Correct) -> Tip:
 
 
 def refuse_corrected(machine: Machine, moves: Moves, path: str, hint: str) -> None:
-    """Raise RefusedError NCF438 for a program that seems to have been corrected for this machine (see `suspected`)."""
+    """Raise RefusedError NCF438 if a program seems to have been corrected for this machine (see `suspected`)."""
     correctable: Mask = (moves.rule == Rule.CORRECT) & np.isfinite(moves.end).all(axis=1)
     shift = np.zeros_like(moves.end)
     intent = Intent(machine, moves, State())

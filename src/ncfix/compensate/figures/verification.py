@@ -1,4 +1,4 @@
-"""What a machine does with two programs, measured against what the first of them means: figures and a verdict."""
+"""Verification of a corrected program: both programs on a machine against the intent of the original, and a verdict."""
 
 from __future__ import annotations
 
@@ -21,17 +21,20 @@ from ncfix.values import frozen
 
 @frozen
 class Compared:
-    """Two programs on one machine: figures of the original, of the other along its own path, and along the original's.
+    """The comparison of two programs on one machine.
 
-    beyond       lines of the other with errors larger than tolerance and rounding
-    not_reached  lines of the original from which the other is farther away
-    unseen       lines of the original that may cut, and are not looked at
-    no_figure    how many motions at feed are not looked at, by reason
-    blind        some of these may cut
-    left         linear axis -> lines of the original that cut, and nobody but the machine knows where that axis stands:
-                 nothing can be corrected along it there
-    rounding_um  what the control's digits may add to the path
-    messages     what there is to say of following the two
+    before       figures of the original: from its actual path to its intended path
+    after        figures of the other program: from its actual path to the original's intended path
+    left_out     figures from the original's intended path to the actual path of the other program
+    beyond       lines of the other program with errors larger than tolerance and rounding
+    not_reached  lines of the original from which the other program is farther away than that
+    unseen       lines of the original that may cut and were not examined
+    no_figure    number of feeds, arcs and holes that were not examined, by reason
+    blind        whether some of these may cut
+    left         letter of a linear axis -> lines of the original that cut while only the machine knows where that axis
+                 stands, so that nothing can be corrected along it
+    rounding_um  largest deviation that the control's digits may add to the path
+    messages     messages from following both programs
     """
 
     before: dict[str, Any]
@@ -48,17 +51,17 @@ class Compared:
 
     @property
     def beyond_somewhere(self) -> bool:
-        """Something is farther from the intended path than the tolerance and what rounding adds."""
+        """Whether a place is farther from the intended path than tolerance and rounding allow, in either direction."""
         return bool(self.beyond or self.not_reached)
 
     @property
     def within(self) -> bool:
-        """Nothing is farther from the intended path than that, and nothing that may cut is left out."""
+        """Whether every place is within tolerance and rounding, and no motion that may cut was left out."""
         return not self.beyond_somewhere and not self.blind
 
     @classmethod
     def of_all(cls, comparisons: Sequence[RunningComparison], said: Sequence[Sequence[Message]]) -> Compared:
-        """The worst of several ways in which the programs may run, and what is said of following the two, once."""
+        """The worst of all positions of block delete, with the messages from following both programs, once each."""
         of_first, of_second = said
         told = {(each.code, each.text) for each in of_first}
         messages = *of_first, *(each for each in of_second if (each.code, each.text) not in told)
@@ -66,7 +69,7 @@ class Compared:
 
     @classmethod
     def of(cls, comparison: RunningComparison) -> Compared:
-        """What was found along both programs."""
+        """The result of one comparison."""
         before, there, back = (match.along for match in comparison.matches)
         return cls(
             before=before.figures(),
@@ -83,7 +86,7 @@ class Compared:
 
     @classmethod
     def together(cls, several: Sequence[Compared]) -> Compared:
-        """The worst of several ways in which the programs may run."""
+        """The worst of several comparisons, one for each position of block delete."""
         axes = dict.fromkeys(axis for each in several for axis in each.left)
         reasons = sorted({reason for each in several for reason in each.no_figure})
         return cls(
@@ -101,7 +104,7 @@ class Compared:
 
 
 def _worst(several: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The figures of the one with the largest error, and the largest rms, of those in which something was looked at."""
+    """The figures with the largest error, and the largest rms of all; figures without samples do not count."""
     seen = [each for each in several if each["max"] is not None]
     if not seen:
         return several[0]
@@ -120,11 +123,11 @@ def side_by_side(
     tolerance_um: float,
     resolves: tuple[Resolve | None, Resolve | None] = (None, None),
 ) -> tuple[list[RunningComparison], tuple[Sequence[Message], Sequence[Message]]]:
-    """Two programs gone along side by side, once for each position of block delete; what is said of following them.
+    """Two programs compared in each position of block delete, and the messages from following each program.
 
-    resolves  of each: gives the text of a subprogram by its name
+    resolves  for each program, returns the text of a subprogram by its name
 
-    Raises what `follow` raises, and `UsageError` NCF025 for a tolerance that is none.
+    Raises what `follow` raises, and `UsageError` NCF025 for an invalid tolerance.
     """
     TOLERANCE_UM.check("tolerance_um", tolerance_um)
     machine = resolving(machine, original.dialect, original.source)

@@ -1,13 +1,13 @@
-"""Contours that the control offsets by the radius of the tool: how far the tool is off along its own path.
+"""Contours that the control offsets by the tool radius: the error of the tool on its own, offset path.
 
-With cutter radius compensation the program says the contour, and the tool goes beside it. What the control makes of
-corrected points at a corner is not what was added to them: the lines beside the contour turn with their ends, and where
-they meet moves by that over the cosine of half the turn. So the tool is followed here where it goes: beside each
-motion, and at each corner, inside it where the lines beside it meet, outside it round the corner and, in turns of less
-than a right angle, where controls lead the lines on until they meet.
+With cutter radius compensation the program gives the contour, and the tool goes beside it. At a corner, the offset of
+corrected points is not the offset of the programmed points plus the correction: the offset lines turn with their ends,
+and their intersection moves by that over the cosine of half the turn. So the tool is followed on its own path: beside
+each motion and at each corner. At an inner corner it goes to the intersection of the offset lines; at an outer corner,
+round the corner and, in turns of less than a right angle, to the intersection of the extended offset lines, too.
 
-Distances are those of curves: at a place of a motion across it; at a corner from either path to the nearest of the two
-rays of the other one.
+Distances are those of curves: beside a motion, across its path; at a corner, from the corner of either path to the
+nearest of the two rays of the other path.
 """
 
 from __future__ import annotations
@@ -22,29 +22,29 @@ from ncfix.control.moves import MotionKind, Moves
 from ncfix.values import frozen
 
 NO_WAY = 1e-9
-"""mm in the plane; a motion that goes no farther makes no corner."""
+"""Way in the plane, mm, up to which a motion makes no corner."""
 SMOOTH = 0.02
-"""rad; where two motions turn by less, the lines beside them are taken to meet over the corner."""
+"""Turn, rad, below which the offset lines of two motions are taken to meet beside the corner."""
 SHARPEST = 0.05
-"""Cosine of half the turn: in sharper corners the lines beside meet far away, and are looked at so far at most."""
+"""Least cosine of half the turn: the intersection of the offset lines at sharper corners is limited to that here."""
 STEPS = 12
-"""Newton steps to where curves beside two motions meet."""
+"""Number of Newton steps to the intersection of the offset curves of two motions."""
 MET = 1e-6
-"""mm"""
+"""Largest distance, mm, of two points that are the same."""
 LOOKS = 4
-"""Places for each time that the error may bend; at least `LEAST`."""
+"""Number of samples for each time that the error may bend; at least `LEAST`."""
 LEAST = 5
 
 
 @frozen
 class OffsetPoints:
-    """Places of the tool beside a contour, flat.
+    """Samples of the offset path of the tool, flat.
 
     move      (k,) the motion, or the one that ends at the corner
-    before    (k,) mm: how far the tool is off without a correction
-    after     (k,) mm: with it
-    corner    (k,) at a corner at which the contour turns
-    rounding  (k,) what there half a step in each word may do, in half steps
+    before    (k,) error of the tool without a correction, mm
+    after     (k,) error of the tool with the correction, mm
+    corner    (k,) whether the sample is at a corner at which the contour turns
+    rounding  (k,) effect of rounding all words by half an output step, in half steps
     """
 
     move: Index
@@ -56,13 +56,13 @@ class OffsetPoints:
 
 @frozen
 class ContactPath:
-    """A path of tool contact in columns: rows are those motions of a program that make a way beside a contour.
+    """The motions of a contour that the control offsets by the tool radius.
 
-    start, end  (k, 3) of the contour, mm
-    arc         (k,)
-    centre      (k, 3), and `turn` (k,) the sense in which arcs go about `up`: 1 or -1
-    up          (k, 3) unit normals of the planes
-    radius      (k,) mm to the left of the way
+    start, end  (k, 3) ends of the motions on the contour, mm
+    arc         (k,) whether the motion is an arc
+    centre      (k, 3) centre of an arc, mm; `turn` (k,): its sense about `up`, 1 or -1
+    up          (k, 3) unit normal of the plane of compensation
+    radius      (k,) offset to the left of the direction of motion, mm
     """
 
     start: Array
@@ -75,7 +75,7 @@ class ContactPath:
 
     @classmethod
     def of(cls, segments: Segments, rows: Index, up: Array, radius: Array) -> ContactPath:
-        """Of motions `rows` done as `segments` have them."""
+        """The motions `rows` (k,) of `segments`."""
         columns = segments.columns
         sense = np.sign(np.nan_to_num(segments.sweep[rows]) * _dot(np.nan_to_num(segments.normal[rows]), up))
         ends = picked(segments.start, rows)[:, columns], picked(segments.end, rows)[:, columns]
@@ -83,18 +83,18 @@ class ContactPath:
         return cls(*ends, arc, np.nan_to_num(segments.centre[rows]), sense, up, radius)
 
     def heading(self, points: Array) -> Array:
-        """The way in the plane at points (k, 3) of the motions, unit vectors."""
+        """(k, 3) direction of motion in the plane at points (k, 3) of the motions, unit vectors."""
         straight = _flat(self.end - self.start, self.up)
         spoke = _flat(points - self.centre, self.up)
         way = np.where(self.arc[:, None], self.turn[:, None] * vector_product(self.up, spoke), straight)
         return _unit(way)
 
     def left(self, points: Array) -> Array:
-        """The way to the left at points (k, 3) of the motions, unit vectors in the plane."""
+        """(k, 3) direction to the left in the plane at points (k, 3) of the motions, unit vectors."""
         return vector_product(self.up, self.heading(points))
 
     def beside(self, points: Array, way: Array) -> Array:
-        """Where the tool is, (k, 3), gone on by `way` (k,) mm in the plane from beside points of the motions."""
+        """(k, 3) the tool on the offset path, `way` (k,) mm farther in the plane than beside points (k, 3), mm."""
         here = points + self.radius[:, None] * self.left(points)
         straight = here + way[:, None] * self.heading(points)
         spoke = _flat(here - self.centre, self.up)
@@ -104,7 +104,7 @@ class ContactPath:
         return np.where(self.arc[:, None], here - spoke + turned, straight)
 
     def beside_heading(self, at: Array) -> Array:
-        """The way of the tool at places beside motions, unit vectors."""
+        """(k, 3) direction of the tool at places `at` (k, 3) of the offset path, unit vectors."""
         spoke = _flat(at - self.centre, self.up)
         sign = self.turn * np.sign(
             1 - self.turn * self.radius / np.maximum(lengths(_flat(self.end - self.centre, self.up)), NO_WAY)
@@ -114,16 +114,16 @@ class ContactPath:
 
 
 def is_offset(moves: Moves) -> Mask:
-    """(n,) motions beside which the control takes the tool by a radius that is known."""
+    """(n,) whether the control offsets the motion by a known tool radius."""
     if moves.beside is None:
         return np.zeros(len(moves), dtype=bool)
     return np.nan_to_num(moves.beside) != 0
 
 
 def beside_contours(intent: Intent, real: Segments) -> OffsetPoints | None:
-    """How far the tool is off beside contours of which its radius is known; None if there are none.
+    """Errors of the tool on its offset path, beside contours with a known tool radius; None if there are none.
 
-    real  all motions as they are done
+    real  all motions, as corrected
     """
     moves = intent.moves
     if moves.beside is None or moves.across is None:
@@ -140,7 +140,7 @@ def beside_contours(intent: Intent, real: Segments) -> OffsetPoints | None:
     if not rows.size:
         return None
     parts = [_along(intent, real, rows, meant, done)]
-    # two that follow each other beside one contour, but for motions between them that go nowhere in the plane
+    # consecutive motions of one contour; motions between them without way in the plane do not count
     moving = np.zeros(len(moves), dtype=bool)
     moving[rows] = True
     off = np.flatnonzero(np.nan_to_num(moves.beside, nan=1.0) == 0)
@@ -161,7 +161,7 @@ def beside_contours(intent: Intent, real: Segments) -> OffsetPoints | None:
 
 
 def _along(intent: Intent, real: Segments, rows: Index, meant: ContactPath, done: ContactPath) -> OffsetPoints:
-    """Beside the motions, from begin to end."""
+    """Errors of the tool beside the motions, from their start to their end."""
     counts, fraction = interior(intent, real, rows, LOOKS, LEAST)
     own, fraction = owners(counts), fraction
     own = np.concatenate([own, np.arange(len(rows)), np.arange(len(rows))])
@@ -188,7 +188,11 @@ def _along(intent: Intent, real: Segments, rows: Index, meant: ContactPath, done
 def _at_corners(
     intent: Intent, real: Segments, rows: Index, pairs: list[tuple[ContactPath, ContactPath]], leads_in: Mask
 ) -> list[OffsetPoints]:
-    """At corners between motions `rows` (k,) and the next ones of the contour."""
+    """Errors of the tool at corners between motions `rows` (k,) and the next motions of the contour.
+
+    pairs     both motions of each corner, as programmed and as corrected
+    leads_in  (k,) the contour begins with the first motion, so the tool comes straight to it
+    """
     first, second = pairs[0]
     ones = np.ones(len(rows))
     ends = [each.at(rows, ones) for each in (intent.segments, real)]
@@ -201,7 +205,7 @@ def _at_corners(
     lever = 1 + beyond / np.maximum(shortest, NO_WAY)
     digits = np.hypot(2**0.5 * lever / half, 1.0)
     found = []
-    # where the curves beside them meet: inside, and outside in turns of less than a right angle
+    # the intersection of the offset curves: at inner corners, and at outer ones of less than a right angle
     meet = ~leads_in & (inner | (np.abs(turn) <= np.pi / 2))
     points, arrived = zip(*(_meeting(one, other, turn) for one, other in pairs), strict=True)
     wedge = np.flatnonzero(meet & arrived[0] & arrived[1])
@@ -216,7 +220,7 @@ def _at_corners(
         ]
         sizes = _from_wedge(before, *rays), _from_wedge(after, *rays)
         found.append(OffsetPoints(rows[wedge], *sizes, sharp[wedge], digits[wedge]))
-    # round it, and where the tool comes from and goes on; all the more where nothing meets
+    # round an outer corner: at its begin, middle and end; also where the offset curves do not meet
     round_ = np.flatnonzero(~inner | leads_in | ~(arrived[0] & arrived[1]))
     for share in (0.0, 0.5, 1.0):
         if not round_.size:
@@ -235,7 +239,7 @@ def _at_corners(
 
 
 def _meeting(one: ContactPath, other: ContactPath, turn: Array) -> tuple[Array, Mask]:
-    """Where the curves beside two motions meet that meet at a corner, (k, 3), and whether they do."""
+    """(k, 3) intersection of the offset curves of two motions that meet at a corner, mm, and whether there is one."""
     corner = one.radius * np.tan(np.clip(turn, -3.0, 3.0) / 2)
     most = np.abs(one.radius) / SHARPEST
     back, on = np.clip(-corner, -most, most), np.clip(corner, -most, most)
@@ -258,7 +262,7 @@ def _meeting(one: ContactPath, other: ContactPath, turn: Array) -> tuple[Array, 
 
 
 def _gaps(intent: Intent, move: Index, fraction: Array, meant: Array, done: Array) -> tuple[Array, Array]:
-    """Actual minus intended tip, (k, 3) mm, under the commands of the program and under others (k, n_axes)."""
+    """(k, 3) actual minus intended tip, mm, under programmed commands `meant` and corrected ones `done` (k, n_axes)."""
     joints = [intent.joints(move, each) for each in (meant, done)]
     gaps = intent.gaps(move, meant, joints, intent.states(move, fraction))
     before, after = (correctable(intent, move, each, gap) for each, gap in zip((meant, done), gaps, strict=True))
@@ -266,18 +270,18 @@ def _gaps(intent: Intent, move: Index, fraction: Array, meant: Array, done: Arra
 
 
 def _in_tip(intent: Intent, move: Index, commands: Array, ways: Array) -> Array:
-    """Unit vectors (k, 3) of commands as the tip makes them in the workpiece."""
+    """(k, 3) unit vectors of X Y Z of commands, as directions of the tip in the workpiece."""
     return _unit(np.einsum("kij,kj->ki", np.broadcast_to(intent.follows(move, commands), (len(move), 3, 3)), ways))
 
 
 def _across(gap: Array, tangent: Array) -> Array:
-    """The size of gaps (k, 3) across a way."""
+    """(k,) size of gaps (k, 3) across the directions `tangent` (k, 3)."""
     along = _dot(gap, tangent)
     return lengths(gap - along[:, None] * tangent)
 
 
 def _from_wedge(gap: Array, come: Array, go: Array) -> Array:
-    """The distance between two corners alike, a gap (k, 3) apart, to which one comes and goes by unit vectors."""
+    """(k,) distance between two equal corners that are a gap (k, 3) apart, with directions `come` and `go` (k, 3)."""
     square = _dot(gap, gap)
     by_come, by_go = (_dot(gap, way) for way in (come, go))
 
@@ -293,7 +297,7 @@ def _dot(vectors: Array, others: Array) -> Array:
 
 
 def _flat(vectors: Array, up: Array) -> Array:
-    """The parts of vectors (k, 3) in planes."""
+    """(k, 3) the components of vectors (k, 3) in the planes with normals `up`."""
     return vectors - _dot(vectors, up)[:, None] * up
 
 
