@@ -1,4 +1,4 @@
-"""The command line, verbs by topic; nothing but arguments, files, messages and exit codes.
+"""The command line: arguments, files, messages and exit codes; nothing else.
 
-Numeric packages are imported inside the commands, so that `--help` answers at once.
+Numeric packages are imported inside the commands, so that `--help` is fast.
 """

@@ -1,4 +1,4 @@
-"""Tables as text, made while what they say is found: many rows at once."""
+"""Writes large tables as text, many rows at a time, while they are computed."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from ncfix.cli import console
 from ncfix.values import frozen
 
 DIGITS = 9
-"""Decimals that are kept: what is below has no meaning on any machine."""
+"""Number of decimals written; smaller digits have no meaning on any machine."""
 ROWS = 1 << 13
-"""Rows that are written at a time."""
+"""Number of rows written at a time."""
 
 
 @frozen
 class WordColumn:
-    """A column of words: which of some names each row has, (n,)."""
+    """A column of words: index into `names` for each row, (n,)."""
 
     names: Sequence[str]
     which: NDArray[Any]
@@ -32,22 +32,22 @@ class WordColumn:
 
 
 def named(kinds: type[IntEnum], values: NDArray[Any]) -> WordColumn:
-    """Kinds by their names."""
+    """A column with the names of enumeration values."""
     known = sorted(kinds)
     return WordColumn([kind.name.lower() for kind in known], np.searchsorted(known, values))
 
 
 Columns = dict[str, NDArray[Any] | WordColumn]
-"""Name -> values, all of one length; whole numbers from 0 on, and others, of which those not known are NaN."""
+"""Name -> values, all of the same length; nonnegative integers, or floats with NaN for unknown values."""
 
 
 @frozen
 class RowForm:
-    """How the rows of a table are written.
+    """The format of a table's rows.
 
-    begin, between, end  what stands before the first cell of a row, between two cells, and behind the last
-    word                 a word as a cell
-    number               a number that is not whole as a cell
+    begin, between, end  text before the first cell of a row, between cells, and after the last one
+    word                 formats a word as a cell
+    number               formats a float as a cell
     """
 
     begin: str
@@ -57,7 +57,7 @@ class RowForm:
     number: Callable[[float], str]
 
     def rows(self, columns: Columns) -> Iterator[bytes]:
-        """The rows, some at a time."""
+        """The rows as text, several at a time."""
         for start in range(0, len(next(iter(columns.values()))), ROWS):
             part = slice(start, start + ROWS)
             cells = [self._cells(each, part) for each in columns.values()]
@@ -77,7 +77,7 @@ def _quoted(word: str) -> str:
 
 
 def _shortest(value: float) -> str:
-    """No noise in the last digits, no minus zero."""
+    """A number without noise in the last digits and without a minus zero."""
     return repr(round(value, DIGITS) + 0.0)
 
 
@@ -92,7 +92,7 @@ JSON = RowForm(
 
 
 def as_csv(tables: Iterable[Columns]) -> Iterator[bytes]:
-    """A header and one line a row; cells of what is not known are empty. All tables have the same columns."""
+    """A header and one line per row; unknown values are empty cells. All tables have the same columns."""
     for number, columns in enumerate(tables):
         if number == 0:
             yield (",".join(columns) + "\n").encode()
@@ -100,7 +100,7 @@ def as_csv(tables: Iterable[Columns]) -> Iterator[bytes]:
 
 
 def as_json(tables: Iterable[Columns], **content: object) -> Iterator[bytes]:
-    """A JSON object with `content`, the names of the columns, and the rows."""
+    """A JSON object with `content`, the column names, and the rows."""
     rows = 0
     for number, columns in enumerate(tables):
         if number == 0:

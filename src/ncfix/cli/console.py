@@ -1,9 +1,9 @@
-"""The two streams: data on standard output, messages on standard error, nothing else on either.
+"""The two output streams: data on standard output, messages on standard error, and nothing else.
 
-Whatever goes to a terminal goes through here, and nothing in it steers the terminal: names, programs and machine files
-come from anywhere. Text for people is made visible (`diagnostics.visible`) wherever it goes; data is left as it is, but
-where it goes to a terminal. Messages that say the same of several lines of a program are told as one that names them
-all. Bugs are owned up to, and never dressed as the user's mistakes.
+All terminal output passes through here, so that nothing in names, programs or machine files can control the terminal.
+Text for people is always made visible (`diagnostics.visible`); data is changed only if it goes to a terminal. Messages
+that say the same of several lines are merged into one that names all lines. Bugs are reported as bugs, never as
+mistakes of the user.
 """
 
 from __future__ import annotations
@@ -29,27 +29,27 @@ from ncfix.files import unwritable
 from ncfix.plugins import blamed
 
 FEW_STRETCHES = 8
-"""So many stretches of lines are named one by one."""
+"""Largest number of ranges of lines that are listed individually."""
 FIGURE = re.compile(r"(?<![-.\w])\d+(?:\.\d+)?(?:e[-+]\d+)?(?= (?:mm|um|degrees|times)\b(?!/))")
-"""How much it is, in a message."""
+"""The quantity in a message."""
 SCHEMA = 1
-"""Version of the objects that `--json` prints."""
+"""Schema version of the objects printed with `--json`."""
 CODE = re.compile(r"\bNCF\d{3}:")
 MOST = 20
-"""Messages of one code that are written out."""
+"""Largest number of messages of one code that are printed."""
 BUSY_AFTER_S = 2.0
-"""Progress is shown for what takes longer, on a terminal."""
+"""Time, s, after which progress is shown on a terminal."""
 _collected: ContextVar[list[str] | None] = ContextVar("collected", default=None)
 DEBUG = "NCFIX_DEBUG"
-"""The environment variable that asks for tracebacks; workers inherit it."""
+"""Environment variable that enables tracebacks; workers inherit it."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""What the system says where there is no room: never a bug."""
+"""Error numbers of the system for lack of space, which are never bugs."""
 
 
 def said_once(messages: Iterable[Message]) -> list[Message]:
-    """Each message once, where it first stands, with the other lines of which it is said.
+    """Each message once, at its first place, with the other lines to which it applies.
 
-    Of those that differ only in how much it is, the one that says the most stands for all.
+    Messages that differ only in a quantity are represented by the one with the largest value.
     """
     groups: dict[tuple[str, ...], list[Message]] = {}
     for number, message in enumerate(messages):
@@ -70,19 +70,19 @@ def _as_one(group: Sequence[Message]) -> Message:
 
 
 def _kind(text: str) -> str:
-    """A text without its figure; one with several figures is a kind of its own."""
+    """A text without its quantity; a text with several quantities is left unchanged."""
     found = FIGURE.findall(text)
     return FIGURE.sub("", text) if len(found) == 1 else text
 
 
 def _size(text: str) -> float:
-    """The figure of a text, 0 without one."""
+    """The quantity in a text; 0 without one."""
     found = FIGURE.search(text)
     return float(found[0]) if found else 0.0
 
 
 def lines_named(lines: Sequence[int]) -> str:
-    """Line numbers in words, those that follow each other as stretches: "lines 3 to 5, 9"."""
+    """Line numbers in words, consecutive ones as ranges: "lines 3 to 5, 9"."""
     begins = [line for before, line in zip((None, *lines), lines, strict=False) if before is None or line > before + 1]
     ends = [line for line, after in zip(lines, (*lines[1:], None), strict=True) if after is None or after > line + 1]
     if len(begins) > FEW_STRETCHES:
@@ -92,11 +92,11 @@ def lines_named(lines: Sequence[int]) -> str:
 
 
 class ReaderGoneError(Exception):
-    """Whoever read standard output has closed it."""
+    """The reader of standard output has closed it."""
 
 
 def say(text: str) -> None:
-    """A line for people, on standard error; the first code of a message in it is bold on a terminal."""
+    """Print a line for people on standard error; on a terminal, the first message code in it is bold."""
     lines = _collected.get()
     if lines is not None:
         lines.append(text)
@@ -107,19 +107,19 @@ def say(text: str) -> None:
 
 
 def forewarn(text: str) -> None:
-    """A line about what takes a while from here on, on a terminal."""
+    """On a terminal, print a line about something that will take time."""
     if _watched():
         say(text)
 
 
 def _watched() -> bool:
-    """Whether somebody sees on a terminal what is said while it is said."""
+    """Whether somebody can see messages on a terminal at once."""
     return _collected.get() is None and sys.stderr is not None and sys.stderr.isatty()
 
 
 @contextmanager
 def keeping() -> Iterator[list[str]]:
-    """Keep what is said, instead of saying it, in this thread; `say` may say it elsewhere."""
+    """Context in which messages of this thread are collected instead of printed."""
     lines: list[str] = []
     token = _collected.set(lines)
     try:
@@ -129,16 +129,16 @@ def keeping() -> Iterator[list[str]]:
 
 
 def tell(*messages: Message) -> None:
-    """Coded messages, on standard error; one without a hint of its own points to the explanation of its code."""
+    """Print coded messages on standard error; one without a hint refers to the explanation of its code."""
     for plain in messages:
         message = replace(plain, hint=plain.advice)
         say(str(message))
 
 
 def tell_some(messages: Iterable[Message], shown: Callable[[list[Message]], Iterable[Message]] = list) -> None:
-    """Coded messages, those that say the same as one, at most `MOST` of each code; how many more there are is said.
+    """Print coded messages, equal ones merged, at most `MOST` of each code; the number of further ones is printed.
 
-    shown  makes of those that are told what is shown of them
+    shown  selects or changes the messages before they are printed
     """
     seen: Counter[str] = Counter()
     first = []
@@ -153,7 +153,7 @@ def tell_some(messages: Iterable[Message], shown: Callable[[list[Message]], Iter
 
 
 def put(data: str | bytes) -> None:
-    """Text for people on standard output, made visible, or data as it is, but for a terminal; at once."""
+    """Print on standard output and flush: text for people made visible, data unchanged unless it goes to a terminal."""
     if sys.stdout is None:
         raise UsageError.of("NCF007", "is closed", Place("<stdout>"), "-o FILE")
     try:
@@ -170,27 +170,27 @@ def put(data: str | bytes) -> None:
 
 
 def put_all(parts: Iterable[bytes]) -> None:
-    """Data on standard output, part after part."""
+    """Write data to standard output, part by part."""
     for part in parts:
         put(part)
 
 
 def put_json(**content: object) -> None:
-    """One JSON object, see `json_text`, on standard output."""
+    """Print one JSON object, see `json_text`."""
     put(json_text(**content))
 
 
 def json_text(indent: int | None = 1, /, **content: object) -> str:
     """One JSON object with its schema version, in visible ASCII; numbers that are not finite become null.
 
-    indent  of its lines; None: it is on one line
+    indent  indentation; None: all on one line
     """
     text = json.dumps({"schema": SCHEMA, **{key: _plain(value) for key, value in content.items()}}, indent=indent)
     return text.replace("\x7f", "\\u007f") + "\n"
 
 
 def _plain(value: Any) -> Any:
-    """Values as JSON has them: messages by their parts, arrays as lists, no NaN."""
+    """A value in the types of JSON: messages as objects, arrays as lists, no NaN."""
     if isinstance(value, Message):
         return value.as_dict()
     if hasattr(value, "tolist"):
@@ -205,12 +205,12 @@ def _plain(value: Any) -> Any:
 
 
 def counted(count: int, thing: str) -> str:
-    """How many of a thing: "1 block", "2 blocks"."""
+    """A number with its noun: "1 block", "2 blocks"."""
     return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
 def error_figures(error: Mapping[str, Any]) -> str:
-    """The figures of an error along a path, for people."""
+    """The figures of an error along a path, in words."""
     if error["max"] is None:
         return "none, for nothing was looked at"
     where = f", worst at line {error['where']}" if error.get("where") else ""
@@ -218,13 +218,13 @@ def error_figures(error: Mapping[str, Any]) -> str:
 
 
 def no_figure(found: Mapping[str, int]) -> str:
-    """For how many motions there is no figure, and why, the most frequent reason first."""
+    """The number of motions without figures, and the reasons, most frequent first."""
     reasons = ", ".join(f"{count} {reason}" for reason, count in sorted(found.items(), key=lambda item: -item[1]))
     return f"no figure for {counted(sum(found.values()), 'motion')} at feed: {reasons}"
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table on standard output: plain columns, or a drawn table on a terminal."""
+    """Print a table: aligned columns, or a drawn table on a terminal."""
     header, *rows = (tuple(map(visible, row)) for row in (header, *rows))
     if sys.stdout is not None and sys.stdout.isatty():
         _drawn(header, rows)
@@ -248,7 +248,7 @@ def _drawn(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 @contextmanager
 def busy(what: str) -> Iterator[None]:
-    """Show what is going on while it lasts, on a terminal, if it lasts."""
+    """Context that shows on a terminal what is being done, if it takes long."""
     if not _watched():
         yield
         return
@@ -268,17 +268,17 @@ def busy(what: str) -> Iterator[None]:
 
 
 def colour() -> bool | None:
-    """No colour where `NO_COLOR` is set; else it depends on the stream (None)."""
+    """False if `NO_COLOR` is set; None: depends on the stream."""
     return False if os.environ.get("NO_COLOR") else None
 
 
 def abandon_stdout() -> None:
-    """Point standard output at nothing, so that Python's exit does not fail on what could not be written."""
+    """Redirect standard output to nothing, so that Python's exit does not fail on what could not be written."""
     _abandon(sys.stdout)
 
 
 def abandon_unwritable() -> None:
-    """Point streams at nothing that still hold what could not be written: Python's exit would fail on that (120)."""
+    """Redirect streams whose content cannot be written to nothing; otherwise Python's exit would fail (120)."""
     for stream in (sys.stdout, sys.stderr):
         try:
             if stream is not None:
@@ -293,7 +293,7 @@ def _abandon(stream: TextIO) -> None:
 
 
 def owned(error: Exception) -> NcfixError:
-    """An exception as the error that is told: a remedy where there is one, else a fault of ncfix."""
+    """The error to report for an exception: a coded one if possible, else a fault of ncfix."""
     from ncfix import core
 
     if isinstance(error, NcfixError):
@@ -315,12 +315,12 @@ def owned(error: Exception) -> NcfixError:
 
 
 def is_debugging() -> bool:
-    """Whether tracebacks are asked for."""
+    """Whether tracebacks are enabled."""
     return os.environ.get(DEBUG, "") not in ("", "0")
 
 
 def _trace(error: BaseException) -> None:
-    """The traceback, if that is asked for."""
+    """Print the traceback if enabled."""
     import traceback
 
     if is_debugging():
@@ -328,7 +328,7 @@ def _trace(error: BaseException) -> None:
 
 
 def fault(error: Exception) -> FaultError:
-    """Own up to a bug, with its traceback if that is asked for."""
+    """The error for a bug of ncfix; its traceback is printed if enabled."""
     import traceback
 
     _trace(error)
@@ -340,7 +340,7 @@ def fault(error: Exception) -> FaultError:
 
 @contextmanager
 def debugging(wanted: bool) -> Iterator[None]:
-    """Tracebacks are asked for, as by the environment variable."""
+    """Context in which tracebacks are enabled if `wanted`, as by the environment variable."""
     before = os.environ.get(DEBUG)
     if wanted:
         os.environ[DEBUG] = "1"

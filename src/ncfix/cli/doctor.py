@@ -1,4 +1,4 @@
-"""`ncfix doctor`: what ncfix finds on this computer, and what of it is not as it should be."""
+"""`ncfix doctor`: describes the installation on this computer, and what is wrong with it."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ EXTRAS = {
     "plotly": ("report", "there are no pages of programs"),
     "matplotlib": ("plot", "there are no pictures of programs (`--plot`)"),
 }
-"""What is not needed: package -> its extra, and what it is like without."""
+"""Optional packages: package -> its extra, and the consequence of its absence."""
 NEEDS = re.compile(r"([A-Za-z0-9_.-]+)(?:[^;]*?>=\s*([0-9.]+))?[^;]*(;.*\bextra\b)?")
-"""A requirement: the package, the least version, and something if only an extra asks for it."""
+"""A requirement: package, minimum version, and a third group if only an extra needs it."""
 OLDEST_PYTHON = (3, 11)
 
 
 @frozen
 class HostFinding:
-    """Something that was looked at.
+    """One item of the examination.
 
-    what   is looked at
-    found  what it is like
-    wrong  what to do about it; empty if it is as it should be
+    what   the item
+    found  its state
+    wrong  what to do about it; empty if it is in order
     """
 
     what: str
@@ -49,7 +49,7 @@ class HostFinding:
 
 
 def findings() -> Iterator[HostFinding]:
-    """All that is looked at, in order."""
+    """All items, in order."""
     yield HostFinding("ncfix", f"{__version__}, {Path(__file__).parents[1]}")
     python = f"{platform.python_version()}, {sys.executable}"
     yield HostFinding("Python", python, "" if sys.version_info >= OLDEST_PYTHON else "3.11 or later is needed")
@@ -66,7 +66,7 @@ def findings() -> Iterator[HostFinding]:
 
 
 def _packages() -> Iterator[HostFinding]:
-    """What ncfix needs, and what of its extras is there."""
+    """The packages that ncfix needs, and those of its extras."""
     least: dict[str, str] = {}
     for line in _requirements():
         found = NEEDS.match(line)
@@ -113,7 +113,7 @@ def _plugins() -> Iterator[HostFinding]:
 
 
 def _caches() -> Iterator[HostFinding]:
-    """Where grammars are kept: in the first of these folders that can be written to."""
+    """The folders for cached grammars; the first writable one is used."""
     writable = False
     for folder in host.cache_folders(str(Path(__file__).parents[1] / "text" / "grammar.py")):
         can = _writable(folder)
@@ -126,7 +126,7 @@ def _caches() -> Iterator[HostFinding]:
 
 
 def _writable(folder: Path) -> bool:
-    """Whether a folder can be written to, or made."""
+    """Whether a folder can be written to, or created."""
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
     return folder.is_dir() and os.access(folder, os.W_OK)
@@ -150,7 +150,7 @@ def _room(folder: str) -> int | None:
 
 
 def _outputs() -> HostFinding:
-    """How files are written where this process works."""
+    """How files are written in the working folder."""
     try:
         with tempfile.TemporaryDirectory(prefix=".ncfix-doctor-", dir=os.curdir) as folder:
             path = os.path.join(folder, "whole")

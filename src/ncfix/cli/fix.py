@@ -1,4 +1,4 @@
-"""`ncfix fix`: programs in, corrected programs out, on as many processes as `--jobs` says."""
+"""`ncfix fix`: reads programs and writes corrected programs, on as many processes as `--jobs` says."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ if TYPE_CHECKING:
     from ncfix.cli.shop.pages import Pages
 
 BATCHES = "ncfix.batches"
-"""Where a context keeps the batches of the groups of programs before this one."""
+"""Key in the context for the batches of preceding groups of programs."""
 AUTO = 0
-"""`--jobs auto` as a number: as many as help."""
+"""`--jobs auto` as a number: as many processes as are useful."""
 PAYS_BYTES = 8 << 20
-"""One process more pays for each so much text: starting it costs a tenth of what correcting this text takes."""
+"""Text size, bytes, per additional process: correcting it takes ten times as long as starting a process."""
 PAYS_PROGRAMS = 8
-"""And one for each so many programs besides the first."""
+"""Number of programs, besides the first, per additional process."""
 ON_ONE = 8
-"""At most so many for a single program: each of them reads all of it."""
+"""Largest number of processes for a single program, since each of them reads all of it."""
 
 
 class Jobs(click.IntRange):
@@ -55,14 +55,14 @@ class Jobs(click.IntRange):
         super().__init__(1)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Make it the number, or AUTO."""
+        """The number, or `AUTO`."""
         return AUTO if value == "auto" else super().convert(value, param, ctx)
 
 
 def workers_for(jobs: int, programs: Sequence[OutputTarget], executor: str) -> int:
-    """How many workers these programs get: what was asked for, or as many as help, at most one a processor.
+    """Number of workers for these programs: as asked for, or as many as are useful, at most one per processor.
 
-    For a cluster there are two at least: one alone would be this process.
+    For a cluster at least two, because a single one would be this process.
     """
     from ncfix.batch.work import SCHEME
 
@@ -75,7 +75,7 @@ def workers_for(jobs: int, programs: Sequence[OutputTarget], executor: str) -> i
 
 
 def _size(target: OutputTarget) -> int:
-    """Bytes of a program; what cannot be told (a pipe, no such file) counts as none."""
+    """Number of bytes of a program; 0 if unknown (a pipe, a missing file)."""
     if target.source == STREAM:
         return 0
     try:
@@ -254,7 +254,7 @@ def fix(
 
 
 def like_fix(names: Container[str]) -> Callable[[click.Command], click.Command]:
-    """Give another verb the options of `fix` for these parameters, behind its own."""
+    """Decorator that adds the named options of `fix` to another verb, after its own options."""
 
     def with_options(command: click.Command) -> click.Command:
         command.params += [param for param in fix.params if param.name in names]
@@ -264,7 +264,7 @@ def like_fix(names: Container[str]) -> Callable[[click.Command], click.Command]:
 
 
 def _outputs(context: click.Context, programs: Sequence[str], asked: Outputs) -> Outputs:
-    """Where outputs are to go; what the project file says does not hold where it cannot."""
+    """The outputs asked for; settings of the project file are dropped where they cannot apply."""
     base = group_of(context).folder if is_from_file(context, "output") else None
     output = None if base and (asked.in_place or programs == (STREAM,)) else asked.output
     outputs = replace(asked, output=output, base=base)
@@ -276,7 +276,7 @@ def _outputs(context: click.Context, programs: Sequence[str], asked: Outputs) ->
 def _changes(
     context: click.Context, job: FixJob, programs: Sequence[str], apart: str | None, motions: bool, as_json: bool
 ) -> int:
-    """Show what would change in programs, and in those of the groups behind; the worst exit code."""
+    """Show what would change in these programs and in those of following groups; returns the worst exit code."""
     from ncfix.cli.shop.changes import show_changes
 
     only, before = group_of(context).programs, context.meta.setdefault(BATCHES, [])
@@ -290,7 +290,7 @@ def _changes(
 
 
 def _reported(batches: Sequence[tuple[Batch, int, ExecutorMaker]], as_json: bool, json_lines: bool) -> int:
-    """Do batches, one after the other, and print what comes of them, in the form asked for; the worst exit code."""
+    """Run batches one after the other and print their results in the form asked for; returns the worst exit code."""
     from ncfix.cli.shop.summary import OutcomeKind, Summary, Verbosity
 
     summary, entries, worst = Summary(), list[Mapping[str, Any]](), 0

@@ -1,6 +1,6 @@
-"""Programs followed as the control would, for the verbs that look at their motions.
+"""Follows programs as the control would, for the verbs that examine their motions.
 
-Long programs are gone through part by part while they are read, if that can be, others as wholes.
+Long programs are processed part by part while they are read, if possible; others as a whole.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Found = TypeVar("Found")
 
 @frozen
 class FollowingSetup:
-    """What is needed to follow programs. Without errors to correct, what is not given may be zero."""
+    """What is needed to follow programs. For a machine without errors, missing data count as zero."""
 
     machine: Machine | None
     setup: Setup
@@ -45,14 +45,14 @@ class FollowingSetup:
 
     @classmethod
     def of(cls, machine_path: str | None, dialect: str | None, given: SetupOptions) -> FollowingSetup:
-        """Load what the options name."""
+        """Load the machine and the setup named by options."""
         machine = load_machine(machine_path) if machine_path else None
         setup = given.load(machine)
         exacting = machine is not None and not machine.is_perfect
         return cls(machine, setup if exacting else replace(setup, assume_zero=True), dialect)
 
     def read(self, path: str, text: bytes | None = None) -> Program:
-        """Read a program; `text`: what is in the file."""
+        """Read a program; `text`: content of the file, if already read."""
         return read_program(path, self.dialect, self.machine, text)
 
     def trace(self, program: Program, path: str) -> Trace:
@@ -65,7 +65,7 @@ class FollowingSetup:
         return trace(program, self.setup, *self._axes(program), subprograms(self.setup, path))
 
     def checked(self, program: Program, path: str, flatten: bool = False) -> Checked:
-        """What is found in a program; `flatten`: it may be written out flat."""
+        """The findings in a program; `flatten`: whether it may be written out flat."""
         from ncfix.compensate.checking import check_alone, check_on
 
         if self.machine is None:
@@ -73,7 +73,7 @@ class FollowingSetup:
         return check_on(program, self.machine, self.setup, subprograms(self.setup, path), flatten)
 
     def _axes(self, program: Program) -> tuple[tuple[str, ...], frozenset[str]]:
-        """The axes of the machine, or without one those that the program names; and which of them turn."""
+        """The axes of the machine, else those that the program names; and which of them are rotary."""
         from ncfix.compensate.following import rotary_names
 
         if self.machine is None:
@@ -89,15 +89,15 @@ class FollowingSetup:
 
 
 def axes_of(templates: Sequence[Template]) -> tuple[str, ...]:
-    """X Y Z, and what other axes a program with blocks of these shapes has words for."""
+    """X Y Z and the other axes for which a program with these block shapes has words."""
     words = {word.address for template in templates for word in template.words}
     return LINEAR + tuple(letter for letter in ROTARY + PARALLEL if letter in words)
 
 
 def through(sources: Sequence[Source], in_parts: Callable[[], Found], as_wholes: Callable[[], Found]) -> Found:
-    """What is found in programs; in what is wrong with them, or cannot be found in parts, they are taken as wholes.
+    """Process programs in parts if one is long, else as a whole; also as a whole if that fails or an error is found.
 
-    in_parts  reads them from their beginnings; raises what that does, and `NotInPartsError`
+    in_parts  processes them from their beginnings; may raise any error, and `NotInPartsError`
     """
     long = [source.looked_into() for source in sources]
     if any(long):
@@ -117,7 +117,7 @@ def through(sources: Sequence[Source], in_parts: Callable[[], Found], as_wholes:
 
 
 def tell_of_stamp(source: Source) -> None:
-    """Say of a program whose numbers are to be what is meant that they have been corrected."""
+    """Warn that a program taken as the intended one has been corrected already."""
     if source.stamp:
         from ncfix.text.stamp import remark
 
@@ -125,12 +125,12 @@ def tell_of_stamp(source: Source) -> None:
 
 
 def dialect_in(following: FollowingSetup, source: Source) -> Dialect:
-    """The dialect of a program of which the beginning has been read."""
+    """The dialect of a program whose beginning has been read."""
     return dialect_of(source.head, shown(source.path), following.dialect, following.machine)
 
 
 def task_of(following: FollowingSetup, source: Source, dialect: Dialect, *beside: str) -> Task:
-    """A long program on the machine; `beside`: files beside which its subprograms may be, too."""
+    """The task for a long program on the machine; `beside`: further files beside which its subprograms may be."""
     from ncfix.compensate.checking import OPTIONS
     from ncfix.compensate.following import Task
 
@@ -140,9 +140,9 @@ def task_of(following: FollowingSetup, source: Source, dialect: Dialect, *beside
 
 
 def parts_of(following: FollowingSetup, source: Source, dialect: Dialect) -> tuple[Parts, Iterator[Part]]:
-    """A long program as the control follows it, and its parts; without a machine, with the axes that it names first.
+    """The parts of a long program as the control follows it; without a machine, for the axes in its first lines.
 
-    Going through the parts raises what following does, and `NotInPartsError`.
+    Iterating over the parts raises errors of following, and `NotInPartsError`.
     """
     from ncfix.compensate.checking import OPTIONS
     from ncfix.compensate.following import follower_of

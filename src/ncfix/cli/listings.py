@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 SHELLS = ("bash", "zsh", "fish")
 PARTS = (("understands", "corrected"), ("passes", "passed by rule"), ("refuses", "refused, with the line"))
-"""Fields of `Dialect`, and what they are called for people."""
+"""Fields of `Dialect`, and their headings."""
 FLOORS = (
     "cli",
     "reports",
@@ -73,7 +73,7 @@ def own_codes(dialect: Dialect) -> list[str]:
 
 
 def all_codes() -> dict[str, Code]:
-    """The codes of all floors and plugins, in order."""
+    """The message codes of all packages and plugins, sorted."""
     modules = ["ncfix.codes", *(f"ncfix.{floor}.codes" for floor in FLOORS)]
     found: dict[str, Code] = {}
     for module in modules:
@@ -141,7 +141,7 @@ def completion(context: click.Context, shell: str) -> None:
 
 
 def completion_script(command: click.Command, shell: str) -> str:
-    """What a shell runs to complete the arguments of `ncfix`."""
+    """The script with which a shell completes the arguments of `ncfix`."""
     found = get_completion_class(shell)
     assert found is not None
     return found(command, {}, "ncfix", "_NCFIX_COMPLETE").source()

@@ -1,7 +1,7 @@
-"""Verbs about machines: `ncfix machine check|show`, `ncfix effects`, `ncfix derive`.
+"""Verbs for machines: `ncfix machine check|show`, `ncfix effects`, `ncfix derive`.
 
-Is a machine file in order, and what does it say; which effects and bases it may name; the error equations of a machine,
-symbolically.
+They check and print machine files, list the effects and bases that these can use, and derive the error equations of a
+machine symbolically.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Row = dict[str, str]
 COLUMNS = ("name", "unit", "title", "basis", "much", "seen by", "needs", "squareness")
-"""Of the table of effects."""
+"""Columns of the table of effects."""
 GENERIC = """
 ncfix = 1
 topology = "w C B F X Y Z t"
@@ -34,9 +34,9 @@ axis.Z = { type = "linear", direction = [0, 0, 1], range = [-250, 250], pitch = 
 axis.B = { type = "rotary", direction = [0, -1, 0] }
 axis.C = { type = "rotary", direction = [0, 0, -1] }
 """
-"""The machine whose effects are listed if none is given."""
+"""The machine whose effects are listed if no machine is given."""
 CONSTANT = ("locations", "spindle")
-"""The errors of a machine that a protocol is made for, unless it is said otherwise: those that are constants."""
+"""Default selection of errors for a measuring protocol: the constant ones."""
 
 
 @click.group()
@@ -72,7 +72,7 @@ def check(file: str, as_json: bool) -> int:
 
 
 def _remarks(machine: Machine, path: str) -> list[Message]:
-    """What is possible and odd: a control that nobody here knows (a plugin may), play with the other sign."""
+    """Remarks on valid but unusual values: an unknown control (a plugin may know it), play of opposite sign."""
     from ncfix.machine.effects import runs_ahead
 
     remarks = []
@@ -143,7 +143,7 @@ def _effect_as_dict(machine: Machine, effect: Effect) -> dict[str, Any]:
 
 
 def _page(machine: Machine) -> Iterator[str]:
-    """The facts, the joints as they follow one another, and the errors of each."""
+    """The general facts, the axes in their order, and the errors of each."""
     from ncfix.machine.effects import depends_on, facts, travel_of, vector
 
     yield f"{machine.name}  ({machine.hash})"
@@ -234,7 +234,7 @@ def _physical(machine: Machine) -> list[Row]:
 
 
 def _nameless(machine: Machine) -> list[Row]:
-    """Effects of plugins that this machine cannot have, or that only diagnosis knows."""
+    """Effects of plugins that this machine cannot have, or that only diagnosis uses."""
     from ncfix.machine.effects import library
     from ncfix.plugins import registry
 
@@ -244,7 +244,7 @@ def _nameless(machine: Machine) -> list[Row]:
 
 
 def _row(name: str, title: str, **others: str) -> Row:
-    """A row of the table, whose columns are in this order."""
+    """A row of the table, with the columns in their order."""
     cells = {"name": name, "title": title, **others}
     return {column: cells.get(column.replace(" ", "_"), "") for column in COLUMNS}
 

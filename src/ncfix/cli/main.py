@@ -1,4 +1,4 @@
-"""The command `ncfix`: finds the verb, runs it, and turns whatever happens into messages and an exit code."""
+"""The command `ncfix`: finds the verb, runs it, and turns every result or exception into messages and an exit code."""
 
 from __future__ import annotations
 
@@ -54,30 +54,30 @@ MODULES = {
     "watch": "shop.watch",
     **dict.fromkeys(("dialects", "plugins", "explain", "completion"), "listings"),
 }
-"""In which module of `ncfix.cli` the command of a verb is, if not in one of its own name."""
+"""Verb -> module of `ncfix.cli` with its command, if the module has another name."""
 
 PROJECT_VERBS = ("fix", "verify", "simulate")
-"""Verbs that need a machine, and find it in a project file."""
+"""Verbs that need a machine, which a project file can give."""
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it: 128 + SIGINT."""
 
 MOST_DIGITS = 1 << 17
-"""Digits of a whole number: as many as the longest line that a control reads has characters, and more."""
+"""Largest number of digits of an integer; not less than the characters of the longest line that a control reads."""
 
 BROKEN_PIPE = 141
-"""Exit code when the reader of standard output has gone: 128 + SIGPIPE."""
+"""Exit code if the reader of standard output closed it: 128 + SIGPIPE."""
 
 
 class Verbs(click.Group):
-    """The verbs, each imported when it is asked for; those of plugins come after the built-in ones."""
+    """The group of verbs, each imported on use; those of plugins follow the built-in ones."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """All verbs."""
         return [*VERBS, *sorted(name for name in registry("commands", dict.fromkeys(VERBS)) if name not in VERBS)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """One verb; plugins are only loaded if it is not a built-in one."""
+        """One verb; plugins are loaded only if it is not built in."""
         if cmd_name in VERBS:
             return getattr(import_module(f"ncfix.cli.{MODULES.get(cmd_name, cmd_name)}"), cmd_name)
         return registry("commands").get(cmd_name)
@@ -85,7 +85,7 @@ class Verbs(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The verb that the arguments begin with; of one that there is not, what may be meant is said."""
+        """The verb at the beginning of the arguments; for an unknown one, the error suggests a similar one."""
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
@@ -96,7 +96,7 @@ class Verbs(click.Group):
             raise click.UsageError(text, error.ctx) from error
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The verbs, each with a short line; built-in ones are not imported for that."""
+        """Write the verbs with their summaries; built-in ones are not imported for that."""
         others = {name: self.get_command(ctx, name) for name in self.list_commands(ctx) if name not in VERBS}
         summaries = VERBS | {name: command.get_short_help_str(60) for name, command in others.items() if command}
         with formatter.section("Commands"):
@@ -111,10 +111,10 @@ def cli(debug: bool) -> None:
 
 
 def main() -> None:
-    """The console script.
+    """Entry point of the console script.
 
-    What numpy warns of while it works on odd input is for those who look for faults, as is Python's limit on the digits
-    of whole numbers, which is below what a line of a program may have.
+    Warnings of numpy on unusual input are shown only when debugging. Python's limit on the digits of integers is
+    raised, because a line of a program may have more.
     """
     sys.set_int_max_str_digits(MOST_DIGITS)
     if isinstance(sys.stdout, TextIOWrapper):
@@ -128,7 +128,7 @@ def main() -> None:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run one command line; the exit code. Nothing is raised."""
+    """Run one command line; returns the exit code and raises nothing."""
     with debugging("--debug" in arguments):
         return _run(arguments)
 
@@ -152,7 +152,7 @@ def _run(arguments: Sequence[str]) -> int:
 
 
 def wrong_use(error: click.ClickException, arguments: Sequence[str], as_json: str | None) -> int:
-    """Say what is wrong with the command line."""
+    """Report a wrong command line; returns the exit code."""
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         console.say(error.format_message())
         return ExitCode.USAGE
@@ -168,7 +168,7 @@ def wrong_use(error: click.ClickException, arguments: Sequence[str], as_json: st
 
 
 def failed(error: NcfixError, as_json: str | None) -> int:
-    """Say what failed, also on standard output where that was asked to be JSON, by this option."""
+    """Report a failure, with --json or --json-lines (`as_json`) also on standard output; returns the exit code."""
     console.tell(*error.messages)
     if as_json:
         with suppress(NcfixError, console.ReaderGoneError):
@@ -179,7 +179,7 @@ def failed(error: NcfixError, as_json: str | None) -> int:
 
 @contextmanager
 def plugin_warnings_as_messages() -> Iterator[None]:
-    """Show that a plugin was left out as a coded message instead of a Python warning."""
+    """Context in which a warning about a plugin is shown as a coded message."""
     with warnings.catch_warnings():
         warnings.simplefilter("always", PluginWarning)
         show = warnings.showwarning

@@ -1,4 +1,4 @@
-"""The manual page of `ncfix`, made of what `--help` says of each verb; `share/` has it with the completion scripts."""
+"""The manual page of `ncfix`, made from the help texts of all verbs; `share/` has it with the completion scripts."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SHARED = {
     "zsh": "zsh/site-functions/_ncfix",
     "fish": "fish/vendor_completions.d/ncfix.fish",
 }
-"""Where shells look for completion scripts, below `share`."""
+"""Paths of completion scripts below `share`, by shell."""
 PAGE = "man/man1/ncfix.1"
 
 
@@ -46,7 +46,7 @@ def shared_files() -> Iterator[tuple[str, str]]:
 
 
 def page() -> str:
-    """The manual page, in the language of man(7)."""
+    """The manual page in the markup of man(7)."""
     return "\n".join(_page()) + "\n"
 
 
@@ -89,7 +89,7 @@ def _item(term: str, text: str) -> Iterator[str]:
 
 
 def _escaped(text: str) -> str:
-    """Plain text as man(7) has it: backslashes and hyphens are literal, and no line begins with a command."""
+    """Plain text in the markup of man(7): backslashes and hyphens are literal, and no line begins with a command."""
     found = text.replace("\\", r"\e").replace("-", r"\-").replace("`", "")
     return re.sub(r"^([.'])", r"\\&\1", found)
 

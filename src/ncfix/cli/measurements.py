@@ -1,7 +1,6 @@
-"""Verbs about measurements: `ncfix plan`, `ncfix calibrate`, `ncfix diagnose`.
+"""Verbs for measurements: `ncfix plan`, `ncfix calibrate`, `ncfix diagnose`.
 
-The poses that tell most about a machine's errors; the errors that measurements show; why a machine disagrees with its
-model.
+They choose the poses to measure, estimate errors from measurements, and find why a machine disagrees with its model.
 """
 
 from __future__ import annotations
@@ -41,11 +40,11 @@ if TYPE_CHECKING:
     from ncfix.measure.plan import Planned
 
 FULL_TEST = 5
-"""Runs of a test by ISO 230-2 of an axis of up to 2 m."""
+"""Number of runs of a test by ISO 230-2, for an axis of up to 2 m."""
 FIGURES = {name: name for name in ("A", "R", "E", "M", "B")}
 FIGURES |= {f"{name}_{side}": f"{name} {side}" for name in ("A", "R", "E") for side in ("up", "down")}
 FIGURES["mean_reversal"] = "mean B"
-"""Of ISO 230-2, and how they are said."""
+"""Figures of ISO 230-2, and their printed names."""
 
 
 @click.command()
@@ -159,13 +158,13 @@ def _as_dict(calibration: Calibration, over: Prediction) -> dict[str, Any]:
 
 
 def _told_of(measurement: Measurement) -> dict[str, Any]:
-    """What a file says of itself."""
+    """The header data of a measurement file."""
     notes = {key: measurement.header(key) for key in ("instrument", "date", "operator", "note")}
     return {"path": measurement.path, "kind": measurement.kind, "rows": len(measurement), **notes}
 
 
 def _ball_bars(calibration: Calibration) -> list[dict[str, Any]]:
-    """What ball-bar tests say by themselves, um."""
+    """Figures of the ball-bar tests by themselves, um."""
     from dataclasses import asdict
 
     from ncfix.measure.lengths import ball_bar_figures
@@ -175,7 +174,7 @@ def _ball_bars(calibration: Calibration) -> list[dict[str, Any]]:
 
 
 def _positioning(calibration: Calibration) -> list[dict[str, Any]]:
-    """ISO 230-2 of direct readings, um and urad."""
+    """Figures of ISO 230-2 from direct readings, um and urad."""
     from dataclasses import asdict
 
     from ncfix.measure.direct import positioning_figures
@@ -215,7 +214,7 @@ def _rows(calibration: Calibration) -> Iterator[tuple[str, str, str, str]]:
 
 
 def _noise(calibration: Calibration) -> str:
-    """How the residuals go with the noise; where nobody knows it, they are all that says how large it is."""
+    """The relation of residuals and noise; if the noise is not known, it was estimated from the residuals."""
     freedom = f"{calibration.estimate.freedom} degrees of freedom"
     if calibration.problem.noise_known:
         return f"reduced chi-square {calibration.chi_square:.3f} with {freedom}"
@@ -313,7 +312,7 @@ def plan(
 
 
 def _say(planned: Planned, *, separated: bool) -> None:
-    """What the poses do not tell, and how well the tip error will be known where that was sought."""
+    """Report what the poses cannot determine, and how well the tip error will be known if that was optimised."""
     if planned.unseen:
         console.say(f"no pose of this kind tells {', '.join(planned.unseen)} from the rest")
     if not separated:
@@ -328,7 +327,7 @@ def _say(planned: Planned, *, separated: bool) -> None:
 
 
 def _limits(texts: tuple[str, ...], option: str) -> dict[str, tuple[float, float]]:
-    """NAME=LOW,HIGH or NAME=LOW:HIGH."""
+    """Name -> limits, from NAME=LOW,HIGH or NAME=LOW:HIGH."""
     named = (_named(text.replace(":", ","), 2, option) for text in texts)
     return {name: (limits[0], limits[1]) for name, limits in named}
 

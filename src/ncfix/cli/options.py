@@ -1,4 +1,4 @@
-"""Options that several verbs share, the inputs that they name, and what a shell completes of their values."""
+"""Options shared by several verbs, their inputs, and shell completion of their values."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ force_option = click.option("--force", is_flag=True, help="Replace an existing o
 
 
 class PathName(click.ParamType):  # type: ignore[type-arg]
-    """The path of a file or folder, taken as it is written; the shell itself completes it.
+    """The path of a file or folder, taken as written; completed by the shell itself.
 
-    kind  what the shell is asked for: file or dir
+    kind  what the shell completes: file or dir
     """
 
     name = "path"
@@ -37,16 +37,16 @@ class PathName(click.ParamType):  # type: ignore[type-arg]
         self.kind = kind
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """The path."""
+        """The path as a string."""
         return str(value)
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """What says to the shell that it is to look for files."""
+        """Ask the shell to complete file names."""
         return [CompletionItem(incomplete, type=self.kind)]
 
 
 class OneOf(click.ParamType):  # type: ignore[type-arg]
-    """A name, taken as it is written; those that there are by now are completed."""
+    """A name, taken as written; the names known at that time are completed."""
 
     name = "text"
 
@@ -54,7 +54,7 @@ class OneOf(click.ParamType):  # type: ignore[type-arg]
         self.known = known
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """The names that begin so, in whatever case."""
+        """The known names that begin with the text, ignoring case."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of plugins that are left out: there is no place to say so now
             begun = incomplete.lower()
@@ -62,7 +62,7 @@ class OneOf(click.ParamType):  # type: ignore[type-arg]
 
 
 def of_kind(kind: str) -> OneOf:
-    """The name of something that plugins register: "dialects", "controls", ..."""
+    """The name of a thing that plugins register: "dialects", "controls", ..."""
 
     def known() -> Iterable[str]:
         from ncfix.plugins import registry
@@ -103,7 +103,7 @@ table_option = click.option(
 
 
 class Positive(click.ParamType):  # type: ignore[type-arg]
-    """A finite number above zero, and not below the least that makes sense."""
+    """A finite number above zero and not below `least`."""
 
     name = "number"
 
@@ -135,7 +135,7 @@ class FiniteRange(click.FloatRange):
 
 
 def numbers(within: NumberRange) -> click.FloatRange | click.IntRange:
-    """The numbers of a range, as an option takes them."""
+    """The option type for the numbers of a range."""
     high = None if within.high == math.inf else within.high
     if within.whole:
         return click.IntRange(int(within.low))
@@ -143,7 +143,7 @@ def numbers(within: NumberRange) -> click.FloatRange | click.IntRange:
 
 
 class ToolLength(click.ParamType):  # type: ignore[type-arg]
-    """A length in mm that a tool can have, or none at all."""
+    """A tool length in mm; zero is allowed."""
 
     name = "mm"
 
@@ -168,16 +168,16 @@ tolerance_option = click.option(
 
 
 def load_machine(path: str) -> Machine:
-    """The machine that a file, or standard input, describes."""
+    """The machine described by a file or by standard input."""
     from ncfix.machine import load, loads
 
     return load(path) if path != STREAM else loads(read(path), shown(path))
 
 
 def sound(machine: Machine, path: str, force: bool) -> Machine:
-    """The machine, for something to be made with it; what is odd about it is told.
+    """The machine, after a check that it is plausible; doubts are reported.
 
-    Raises `RefusedError` NCF320 to NCF324 if no machine can be so, unless the user insists.
+    Raises `RefusedError` NCF320 to NCF324 for an impossible machine, unless `force`.
     """
     from ncfix.machine.plausible import doubts, required
 
@@ -195,10 +195,10 @@ def read_program(
     text: bytes | None = None,
     like: Program | None = None,
 ) -> Program:
-    """A program from a file or standard input, in the dialect given, else in that of the machine's control.
+    """A program from a file or standard input, in the given dialect, else in that of the machine's control.
 
-    A control that has no dialect of its own leaves it to what the program looks like. `text`: what is in the file;
-    `like`: a program in whose dialect it is read if no dialect is given, and if it can be.
+    If neither gives a dialect, it is found from the text. `text`: content of the file, if already read; `like`: a
+    program in whose dialect it is read, if no dialect is given and that is possible.
     """
     from ncfix.text.reader import read as read_source
     from ncfix.text.reader import read_like
@@ -212,7 +212,7 @@ def read_program(
 
 
 def dialect_of(head: bytes, path: str, name: str | None, machine: Machine | None) -> Dialect:
-    """The dialect of that name, else what the beginning of a program shows, else that of the machine's control."""
+    """The dialect with this name; without a name, the one found from the text, else that of the machine's control."""
     from ncfix.text.dialect import detect, get
 
     if name is not None:

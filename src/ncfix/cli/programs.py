@@ -1,4 +1,4 @@
-"""Verbs that look at programs and write none: `ncfix check` what is wrong with them, `ncfix trace` their motions."""
+"""Verbs that examine programs and write none: `ncfix check` finds errors, `ncfix trace` lists motions."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 
 
 OUTCOMES = "ncfix.outcomes"
-"""Where a context keeps what was found in the groups of programs before this one."""
+"""Key in the context for the results of preceding groups of programs."""
 Found = tuple["Checked", str]
-"""What is found in a program, and the name of the dialect in which it was read."""
+"""The findings in a program, and the name of its dialect."""
 
 
 def _in_parts(following: FollowingSetup, source: Source) -> Found:
-    """While it is read; raises what that does, and `NotInPartsError`."""
+    """Check a program while it is read; raises errors of reading, and `NotInPartsError`."""
     from ncfix.compensate.checking import survey_alone, survey_on
 
     dialect = dialect_in(following, source)
@@ -85,7 +85,7 @@ def check(
 
 
 def _outcome(following: FollowingSetup, file: ProgramFile, flatten: bool) -> tuple[int, dict[str, Any]]:
-    """What is found in one program: the exit code, and the entry in the JSON object."""
+    """Check one program: the exit code, and its entry in the JSON object."""
     path = file.path
     entry: dict[str, Any] = {"path": shown(path)}
     if why := file.left_out:
@@ -141,7 +141,7 @@ def trace(
 
 
 class TableTexts(NamedTuple):
-    """A table as text; empty in a form that is not asked for."""
+    """A table as text; empty in forms that are not wanted."""
 
     csv: Iterable[bytes]
     json: Iterable[bytes]
@@ -149,7 +149,7 @@ class TableTexts(NamedTuple):
 
 @frozen
 class Motions:
-    """The motions of a program, to be written as a table: `csv`, `json`, or both."""
+    """Writes the motions of a program as a table: `csv`, `json`, or both."""
 
     following: FollowingSetup
     source: Source
@@ -167,7 +167,7 @@ class Motions:
         )
 
     def in_parts(self) -> tuple[TableTexts, Sequence[Message]]:
-        """The table and what there is to say, of a program that is read; raises what that does, `NotInPartsError`."""
+        """The table and messages of a program while it is read; raises errors of reading, and `NotInPartsError`."""
         machine = self.following.machine
         parts, found = parts_of(self.following, self.source, dialect_in(self.following, self.source))
         table = self.written(table_of(part.program, part.moves, machine) for part in found)
@@ -175,7 +175,7 @@ class Motions:
         return table, parts.follower.messages
 
     def whole(self) -> tuple[TableTexts, Sequence[Message]]:
-        """The table and what there is to say, of a program as a whole."""
+        """The table and messages of a program read as a whole."""
         path = self.source.path
         program = self.following.read(path, self.source.everything())
         found = self.following.trace(program, path)
@@ -183,7 +183,7 @@ class Motions:
 
 
 def table_of(program: Program, moves: Moves, machine: Machine | None) -> Columns:
-    """The motions by columns, mm and degrees; the tip only where the machine is known."""
+    """The motions as columns, mm and degrees; the tip only if the machine is known."""
     from ncfix.cli.columns import WordColumn, named
     from ncfix.control.moves import FeedMode, MotionKind, Rule
 
@@ -196,7 +196,7 @@ def table_of(program: Program, moves: Moves, machine: Machine | None) -> Columns
 
 
 def _positions(moves: Moves, machine: Machine | None) -> tuple[Any, Any]:
-    """Axis positions at the ends of the motions, mm and degrees, and where the tip is in the workpiece, mm."""
+    """Axis positions at the ends of the motions, mm and degrees, and the tip in the workpiece, mm."""
     import numpy as np
 
     from ncfix.compensate.plan.kinematics import reached_joints

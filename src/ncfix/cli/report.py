@@ -1,4 +1,4 @@
-"""`ncfix report`: programs, machines and results as a page to be read, printed or filed."""
+"""`ncfix report`: pages on programs, machines and results."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from ncfix.reports.document import ReportSection
 
 DEEPEST = 64
-"""How deep the lists and objects of a result lie in one another at most."""
+"""Largest nesting depth of lists and objects in a result."""
 OF_FIX = ("dialect", "strategy", "tolerance_um", "split_rapids", "flatten")
-"""Parameters of `fix` that a page of a program has, too."""
+"""Parameters of `fix` that also apply to the page of a program."""
 
 
 @like_fix(OF_FIX)
@@ -76,7 +76,7 @@ def report(
 
 
 def _batch(text: bytes, path: str, output: str) -> bytes | None:
-    """The page of a batch, if that is what a source is, and a page in HTML is asked for."""
+    """The page of a batch, if the source is the result of one and an HTML page is asked for; else None."""
     if not text.lstrip().startswith(b"{") or os.path.splitext(output)[1].lower() not in ("", ".html", ".htm"):
         return None
     entries = _result(text, path).get("files")
@@ -98,7 +98,7 @@ def _report_program(
     given: SetupOptions,
     options: dict[str, Any],
 ) -> None:
-    """Correct a program, and make a page of that instead of writing it."""
+    """Correct a program and write its page, but not the program."""
     from ncfix.cli.shop.batch import FixJob
     from ncfix.compensate import FixOptions
 
@@ -117,7 +117,7 @@ def _report_program(
 
 
 def _sections(text: bytes, path: str) -> list[ReportSection]:
-    """What one file has to say: a machine if it is TOML, a result if it is JSON."""
+    """The sections for one file: a machine if it is TOML, a result if it is JSON."""
     if text.lstrip().startswith(b"{"):
         from ncfix.reports.content import result_sections as of_result
 
@@ -145,7 +145,7 @@ def _result(text: bytes, path: str) -> dict[str, Any]:
 
 
 def _check_depth(found: Any) -> None:
-    """Raise RecursionError if lists and objects lie deeper in one another than those of any result."""
+    """Raise RecursionError if lists and objects are nested deeper than in any result."""
     level = [found]
     for _ in range(DEEPEST):
         level = [

@@ -1,4 +1,4 @@
-"""The options that say what a program cannot know: work offsets, tools, start position."""
+"""Options for data that a program cannot contain: work offsets, tools, start position."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 AXIS = re.compile(r"[XYZABCUVW]")
 BOTH = "both"
-"""All positions of block delete."""
+"""Value for all positions of block delete."""
 
 
 class KeyValue(click.ParamType):  # type: ignore[type-arg]
-    """`KEY=VALUE`; the value as `convert_value` makes it, which raises ValueError with what is wrong."""
+    """`KEY=VALUE`; `convert_value` converts the value, or raises ValueError with the reason."""
 
     def __init__(self, metavar: str, convert_value: Callable[[str, str], Any], upper: bool = True) -> None:
         self.name = metavar
@@ -35,7 +35,7 @@ class KeyValue(click.ParamType):  # type: ignore[type-arg]
         self.upper = upper
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The key, in upper case where case means nothing, and the value."""
+        """The key, in upper case unless case matters, and the value."""
         key, equals, text = str(value).partition("=")
         key = key.strip().upper() if self.upper else key.strip()
         if not equals:
@@ -58,7 +58,7 @@ def number(text: str) -> float:
 
 
 def offset_values(name: str, text: str) -> dict[str, float]:
-    """A work offset by axis letter: `0,0,-300`, or `X=..` where the option is written `G54=X0,Z-300`."""
+    """A work offset by axis letter, from `0,0,-300` or `X0,Z-300`."""
     parts = [part.strip() for part in text.split(",")]
     if not re.fullmatch(r"G5[4-9](\.[1-9]\d*(P[1-9]\d*)?)?|G500|G5(0[5-9]|[1-9]\d)|PRESET\d*", name):
         raise ValueError(f"{name} is not a work offset")
@@ -73,7 +73,7 @@ def offset_values(name: str, text: str) -> dict[str, float]:
 
 
 def tool_values(name: str, text: str) -> tuple[float, ...]:
-    """The length of a tool, and its radius if it is given."""
+    """The length of a tool, and its radius if given."""
     if (len(name) < 2 and not name.isdecimal()) or re.fullmatch(r"T\d+|[-+][\d.]+", name):
         raise ValueError(f"{name!r} is not a tool number, nor a name")
     values = tuple(map(number, text.split(",")))
@@ -112,7 +112,7 @@ class Switches(click.ParamType):  # type: ignore[type-arg]
     name = "both|on|off|2,3"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """True, False, `BOTH`, or the switches that are on."""
+        """True, False, `BOTH`, or the numbers of the switches that are on."""
         said = {"on": True, "off": False, BOTH: BOTH}.get(str(value).strip().lower())
         if said is not None or not isinstance(value, str):
             return value if said is None else said
@@ -198,7 +198,7 @@ OPTIONS = (
 
 @frozen
 class SetupOptions:
-    """What was said on the command line about the setup."""
+    """The setup as given by options."""
 
     setup_file: str | None = None
     offsets: tuple[tuple[str, dict[str, float]], ...] = ()
@@ -219,10 +219,9 @@ class SetupOptions:
         return self.setup_file, self.tool_table
 
     def load(self, machine: Machine | None = None) -> Setup:
-        """The setup: the file, then the tool table, then the single options, each over the one before.
+        """The setup: from the file, then the tool table, then single options; later ones override earlier ones.
 
-        Raises what is wrong in the files, and `UsageError` NCF384 for work offsets in the order of the axes of
-        `machine`.
+        Raises errors in the files, and `UsageError` NCF384 for work offsets in the order of the axes of `machine`.
         """
         from ncfix.control.setup import Setup, Tool, check_offsets
 
@@ -265,7 +264,7 @@ class SetupOptions:
 
 
 def setup_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a verb these options; it gets them as one argument `given`."""
+    """Decorator that adds these options to a verb, which gets them as one argument `given`."""
 
     @wraps(command)
     def with_given(*arguments: Any, **options: Any) -> Any:

@@ -1,4 +1,4 @@
-"""`ncfix simulate`: what the errors of a machine do to a program, or to a measurement."""
+"""`ncfix simulate`: the effect of a machine's errors on a program or a measurement."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 NOT_NEGATIVE = numbers(FAULT)
 OF_PLANS = ("noise_um", "drift_um", "quantum_um", "setup_error", "seed")
-"""Options that say nothing of a program."""
+"""Options that do not apply to a program."""
 
 
 @click.command(cls=TableCommand)
@@ -85,7 +85,7 @@ def simulate(
 
 
 def _simulate_program(following: FollowingSetup, program: str, target: OutputTarget | None, as_json: bool) -> None:
-    """Say how large the errors along a program are, and write them to a table if there is to be one."""
+    """Print the errors along a program, and write them as a table if wanted."""
     with source_of(program) as source, ExitStack() as opened:
         errors = Errors(following, source, HeldOutput(target.file, opened) if target else None)
         with console.busy(f"simulating {shown(program)}"):
@@ -102,7 +102,7 @@ def _simulate_program(following: FollowingSetup, program: str, target: OutputTar
 
 
 def _check_apt(of_plan: bool, of_program: bool) -> None:
-    """Refuse options that would say nothing."""
+    """Refuse options that do not apply."""
     context = click.get_current_context()
     named = [name for name in OF_PLANS if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
     if named and not of_plan:
@@ -115,16 +115,16 @@ def _check_apt(of_plan: bool, of_program: bool) -> None:
 
 @frozen
 class Errors:
-    """The errors along the path of a program; `keep`: with a table of them."""
+    """The errors along the path of a program; `keep` stores their table, if wanted."""
 
     following: FollowingSetup
     source: Source
     keep: HeldOutput | None
 
     def in_parts(self) -> tuple[Iterable[bytes], SimulatedErrors, Sequence[Message]]:
-        """The table, the figures and what else there is to say, of a program that is read.
+        """The table, the figures and the messages of a program while it is read.
 
-        Raises what reading does, and `NotInPartsError`.
+        Raises errors of reading, and `NotInPartsError`.
         """
         from ncfix.compensate.figures.simulation import tip_errors_on
 
@@ -134,7 +134,7 @@ class Errors:
         return table, along, messages
 
     def whole(self) -> tuple[Iterable[bytes], SimulatedErrors, Sequence[Message]]:
-        """The table, the figures and what else there is to say, of a program as a whole."""
+        """The table, the figures and the messages of a program read as a whole."""
         from ncfix.compensate.figures.simulation import tip_errors_of
 
         path = self.source.path
@@ -160,7 +160,7 @@ class Errors:
 def _simulate_plan(
     machine_path: str, plan: str, faults: Faults, seed: int, output: str | None, force: bool, as_json: bool
 ) -> None:
-    """Fill in a plan."""
+    """Fill in a measurement plan."""
     from ncfix.measure.measurement import dumps
     from ncfix.measure.reader import reads
 
@@ -179,7 +179,7 @@ def _simulate_plan(
 
 
 def _columns(error: TipError) -> Columns:
-    """The samples by columns: intended tip in mm, error in um."""
+    """The samples as columns: intended tip in mm, error in um."""
     gap_um = 1e3 * (error.actual - error.intended)
     columns: Columns = {"line": error.lines, "fraction": error.fraction}
     columns |= {f"tip_{name}": values for name, values in zip("xyz", error.intended.T, strict=True)}

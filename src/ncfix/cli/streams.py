@@ -1,4 +1,4 @@
-"""Long programs, corrected while they are read; what goes to a pipe goes there part by part."""
+"""Long programs that are corrected while they are read, and written to a pipe part by part."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 
 LONG_BYTES = 3 << 20
-"""A program of so many bytes is long: a shorter one is read as a whole, where `NCFIX_PART_BYTES` does not say more."""
+"""Number of bytes from which on a program is processed in parts, unless `NCFIX_PART_BYTES` is set."""
 
 
 def part_bytes() -> int:
-    """Bytes of a part: `NCFIX_PART_BYTES` if that is set; the output does not depend on it."""
+    """Number of bytes of a part: `NCFIX_PART_BYTES` or the default; the output does not depend on it."""
     from ncfix.compensate.following import PART_BYTES
 
     text = os.environ.get("NCFIX_PART_BYTES") or str(PART_BYTES)
@@ -38,16 +38,16 @@ def part_bytes() -> int:
 
 
 def long_bytes() -> int:
-    """Bytes of which a program is long: corrected and looked at in parts."""
+    """Number of bytes from which on a program is processed in parts."""
     return part_bytes() if os.environ.get("NCFIX_PART_BYTES") else LONG_BYTES
 
 
 @frozen
 class FixedText:
-    """A corrected program: what of it is not written yet, whether it differs from the original, and the report.
+    """A corrected program: the text that is not written yet, whether it differs from the original, and the report.
 
-    dialect  as which it was read
-    page     what its page is made of, if there is to be one
+    dialect  name of the dialect in which it was read
+    page     content of its HTML page, if one is wanted
     """
 
     text: bytes | Iterable[bytes]
@@ -59,7 +59,7 @@ class FixedText:
 
 @contextmanager
 def source_of(path: str) -> Iterator[Source]:
-    """An input file, or standard input, to be read from its beginning."""
+    """Open an input file, or standard input, for reading from its beginning."""
     if path == STREAM:
         with files.unnamed(None) as spool:
             yield Source(path, stdin(), spool)
@@ -79,10 +79,10 @@ def source_of(path: str) -> Iterator[Source]:
 
 @mutable
 class Source:
-    """A text that can be read part by part, and again as a whole: what is read of a pipe goes to a file, its `spool`.
+    """A text that can be read in parts, and again as a whole; text from a pipe is copied to a file, the `spool`.
 
-    began  what the system said of a file at first
-    stamp  where the mark of a corrected program stands, if one of the first lines has it
+    began  status of a file when it was opened
+    stamp  place of the stamp of a corrected program, if it is in the first lines
     """
 
     path: str
@@ -94,23 +94,23 @@ class Source:
     stamp: Place | None = None
 
     def files(self, out: int) -> OpenFiles:
-        """What other processes need to read the text, too, and to write into the file `out`."""
+        """The file handles that other processes need to read the text and to write to the file `out`."""
         from ncfix.compensate.workers import OpenFiles
 
         return OpenFiles((self.spool or self.handle).fileno(), self.spool is None, out)
 
     def check_unchanged(self) -> None:
-        """Raise SourceError NCF002 if the file is not what it was at first: parts of it may not fit together."""
+        """Raise SourceError NCF002 if the file changed since it was opened: its parts may not fit together."""
         began, now = self.began, os.fstat(self.handle.fileno()) if self.began else None
         if began and now and (now.st_size, now.st_mtime_ns) != (began.st_size, began.st_mtime_ns):
             text = "was changed while it was read"
             raise SourceError.of("NCF002", text, Place(shown(self.path)), "fix it again when it is whole")
 
     def looked_into(self, named: bool = False) -> bool:
-        """Read the first bytes, which `read` gives once more; whether there are so many that the program is long.
+        """Read the first bytes, which `read` will return again; returns whether the program is long.
 
-        named  its dialect was said: of a pipe no more than that is waited for; else, and of a file, there are enough of
-               them to tell what the text is
+        named  whether the dialect is given: then no more bytes of a pipe are awaited than decide that; otherwise enough
+               are read to identify the dialect
         """
         from ncfix.text.dialect import PROBE_BYTES
         from ncfix.text.stamp import SIGN
@@ -124,16 +124,16 @@ class Source:
 
     @property
     def first_lines(self) -> bytes:
-        """The lines that the first bytes have, as long as these have not been read."""
+        """The complete lines among the first bytes, until `read` is called."""
         return self.head[: self.head.rfind(b"\n") + 1]
 
     @property
     def size(self) -> int | None:
-        """The bytes of the whole text; None where that is not known yet."""
+        """Number of bytes of the whole text; None if not known yet."""
         return self.began.st_size if self.began else None
 
     def read(self, size: int) -> bytes:
-        """The next bytes, just `size` of them but at the end."""
+        """The next `size` bytes; fewer only at the end."""
         part, self.head = self.head[:size], self.head[size:]
         return part + self._read(size - len(part)) if len(part) < size else part
 
@@ -164,10 +164,10 @@ class Source:
 
 @mutable
 class Outlet:
-    """Where corrected text goes: into a file at first, and to standard output as soon as its stamp is written.
+    """Destination of corrected text: a file first, and standard output as soon as the stamp has been written.
 
-    stamped  whether the stamp, which says all there is to say, is part of what was put in
-    taken    bytes so far, of which so many were `sent`; the others stand in the file, at their places
+    stamped  returns whether the text so far contains the stamp with its final content
+    taken    number of bytes so far, of which `sent` were written out; the others are in the file, at their positions
     """
 
     spool: IO[bytes]
@@ -178,7 +178,7 @@ class Outlet:
     digest: hashlib._Hash = field(default_factory=hashlib.sha256)
 
     def put(self, data: bytes | int) -> None:
-        """Take the next part; or so many bytes of it, which have been put into the file already."""
+        """Take the next part, or its number of bytes if it is already in the file."""
         direct = self.direct and self.stamped()
         if isinstance(data, int):
             self.taken += data
@@ -204,14 +204,14 @@ class Outlet:
             at += len(part)
 
     def remaining(self, stamp: Stamp) -> Iterable[bytes]:
-        """What was not sent, with the stamp as it has to be."""
+        """The text that has not been sent, with the final stamp."""
         if self.sent:
             return self._unsent()
         spool = files.WholeFile(self.spool)
         return spool if stamp.written == stamp.wanted else StampedText(spool, stamp)
 
     def after(self, text: bytes, path: str) -> bytes:
-        """What is left of a text of which the beginning was sent; raises RefusedError NCF013 if it was another."""
+        """The rest of a text whose beginning was sent; raises RefusedError NCF013 if what was sent differs."""
         if hashlib.sha256(text[: self.sent]).digest() != self.digest.digest():
             problem = "what has been written to the pipe already would have to be different"
             raise RefusedError.of(
@@ -222,7 +222,7 @@ class Outlet:
 
 @frozen
 class StampedText:
-    """A text with the stamp as it has to be."""
+    """A text with its stamp replaced by the final one."""
 
     text: Iterable[bytes]
     stamp: Stamp
@@ -236,14 +236,14 @@ class StampedText:
 
 @contextmanager
 def outlet_for(target: OutputTarget, sure: bool, stamped: Callable[[], bool]) -> Iterator[Outlet]:
-    """An outlet; `sure`: everything that the stamp says is known from the beginning."""
+    """An outlet; `sure`: whether the final content of the stamp is known from the beginning."""
     with room_for(target.file) as spool:
         yield Outlet(spool, target.path == STREAM and sure, stamped)
 
 
 @contextmanager
 def room_for(output: str | None) -> Iterator[IO[bytes]]:
-    """A file without a name for what is to be an output, in its folder; None: in that for temporary files."""
+    """A file without a name for a future output, in its folder; None: in the folder for temporary files."""
     folder = None if output is None else os.path.dirname(output) or "."
     with files.said_of(output), files.unnamed(folder) as spool:
         yield spool
@@ -251,11 +251,11 @@ def room_for(output: str | None) -> Iterator[IO[bytes]]:
 
 @frozen
 class HeldOutput:
-    """Keeps the parts of a long output until they are all there; `opened`: what is to be closed then."""
+    """Stores the parts of a long output until all are available; `opened` closes the file."""
 
     output: str | None
     opened: ExitStack
 
     def __call__(self, parts: Iterable[bytes]) -> Iterable[bytes]:
-        """Take the parts as they come; what has been kept."""
+        """Store the parts as they come; returns the stored text."""
         return files.WholeFile.of(parts, self.opened.enter_context(room_for(self.output)))

@@ -1,6 +1,6 @@
-"""Verbs for compensation tables: `ncfix export` makes them, `ncfix emulate` runs them, `ncfix lint` looks for faults.
+"""Verbs for compensation tables: `ncfix export` makes, `ncfix emulate` evaluates, and `ncfix lint` checks them.
 
-A program that is run with tables active gets one figure, as does a program that is rewritten.
+The errors along a program run with the tables, or rewritten, are reported in the same form.
 """
 
 from __future__ import annotations
@@ -160,7 +160,7 @@ def _pair(text: str, form: str) -> tuple[str, str]:
 
 
 def tell(made: Exported, control: Control, as_json: bool) -> None:
-    """Say what the tables leave."""
+    """Report the errors that the tables leave."""
     figures, program = made.left.figures(), made.program
     if as_json:
         entries: dict[str, Any] = {"control": control.name, "assumptions": control.described()["assumptions"]}
@@ -232,7 +232,7 @@ def emulate(
 
 
 def _below(folder: str, messages: Iterable[Message], names: Container[str]) -> tuple[Message, ...]:
-    """The messages with the folder before the names of its files."""
+    """The messages with the folder added to the names of its files."""
     return tuple(
         replace(message, place=replace(message.place, path=os.path.join(folder, message.place.path)))
         if message.place is not None and message.place.path in names
@@ -272,7 +272,7 @@ def lint(paths: tuple[str, ...], control: str, as_json: bool) -> int:
 
 
 def _gathered(paths: Sequence[str]) -> Iterator[tuple[str, dict[str, bytes]]]:
-    """Folder -> the files in it that are meant; raises `SourceError` NCF002."""
+    """Folder -> the files meant in it; raises `SourceError` NCF002."""
     found: dict[str, dict[str, bytes]] = {}
     for path in paths:
         if os.path.isdir(path):

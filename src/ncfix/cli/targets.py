@@ -1,4 +1,4 @@
-"""Inputs and outputs as the command line names them: an input is never changed, an output is whole or not there."""
+"""Inputs and outputs of the command line: inputs are never changed, outputs are written completely or not at all."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from ncfix.outputs import check_named, check_output, check_target, folded_name
 from ncfix.values import frozen
 
 STREAM = "-"
-"""Standard input or output as a file name."""
+"""File name for standard input or output."""
 JSON = "the JSON object"
-"""What `--json` prints, as messages name it."""
+"""Name of the output of `--json` in messages."""
 _TAKEN: WeakSet[IO[bytes]] = WeakSet()
-"""Standard input, when an input has been read from it."""
+"""Contains standard input after an input has been read from it."""
 
 
 def read(path: str) -> bytes:
@@ -37,7 +37,7 @@ def read(path: str) -> bytes:
 
 
 def stdin() -> IO[bytes]:
-    """Standard input, once; raises `SourceError` NCF002 if it is closed, `UsageError` NCF022 if it has been taken."""
+    """Standard input, once; raises `SourceError` NCF002 if it is closed, `UsageError` NCF022 if it was used already."""
     if sys.stdin is None:
         raise files.unreadable(shown(STREAM), OSError(errno.EBADF, "it is closed"))
     stream = sys.stdin.buffer
@@ -53,23 +53,23 @@ def stdin() -> IO[bytes]:
 
 
 def shown(path: str) -> str:
-    """An input's path as messages name it."""
+    """The path of an input in messages."""
     return "<stdin>" if path == STREAM else path
 
 
 @frozen
 class OutputTarget:
-    """Where the output for one input goes.
+    """The destination of the output for one input.
 
-    source    the input, as the user wrote it
+    source    the input, as given by the user
     path      the output; `-` is standard output
-    in_place  the output takes the input's name, which is kept as `backup`
-    force     an existing output may be replaced
-    resume    an existing output is left as it is, if it is what would be written
-    made      digests of what ncfix itself has written there: with `resume`, that may be replaced
-    name      the output's way down from the output folder; empty if there is none
-    root      the output folder, as the user named it; None if there is none
-    program   the input as it was found in a folder; None: it was not
+    in_place  the output gets the input's name, and the input is kept as `backup`
+    force     whether an existing output may be replaced
+    resume    whether an existing output is accepted if it equals what would be written
+    made      digests of outputs that ncfix has written there; with `resume`, these may be replaced
+    name      path of the output below the output folder; empty without a folder
+    root      the output folder, as given by the user; None without a folder
+    program   the input as found in a folder; None if it was not
     """
 
     source: str
@@ -84,14 +84,14 @@ class OutputTarget:
 
     @property
     def is_own(self) -> bool:
-        """Whether there is an output that ncfix has made, and nobody has changed since."""
+        """Whether the existing output was made by ncfix and not changed since."""
         from ncfix.batch.journal import digest_of
 
         return bool(self.made) and digest_of(self.path) in self.made
 
     @property
     def backup(self) -> str:
-        """The name under which the input is kept when the output takes its place."""
+        """The name under which the input is kept if the output replaces it."""
         return f"{self.path}.orig"
 
     @property
@@ -100,7 +100,7 @@ class OutputTarget:
         return None if self.path == STREAM else self.path
 
     def write(self, data: bytes | Iterable[bytes], mode: int | None = None) -> None:
-        """Write the output whole or not at all; raises `UsageError` NCF004 ... NCF008, NCF023.
+        """Write the output completely or not at all; raises `UsageError` NCF004 ... NCF008, NCF023.
 
         mode  permission bits of a new file, as in `files.write_whole`
         """
@@ -120,13 +120,13 @@ class OutputTarget:
 
 @frozen
 class Outputs:
-    """Where the outputs are to go, as the command line says.
+    """The outputs as asked for on the command line.
 
-    output    a file, a folder, `-` for standard output; None: not said
-    in_place  outputs take the places of their inputs
+    output    a file, a folder, or `-` for standard output; None: not given
+    in_place  outputs replace their inputs
     force     existing outputs may be replaced
-    resume    outputs that are there from an earlier run are not done again
-    base      programs below this folder keep their way down from it in the folder of the outputs; None: their names
+    resume    outputs of an earlier run are not made again
+    base      programs below this folder keep their path below it in the output folder; None: only their names
     """
 
     output: str | None = None
@@ -136,7 +136,7 @@ class Outputs:
     base: str | None = None
 
     def folder(self, given: Sequence[str]) -> str | None:
-        """The folder that the outputs go to; None if they do not go to one."""
+        """The output folder; None if the output is not a folder."""
         if self.in_place or self.output in (None, STREAM):
             return None
         assert self.output is not None
@@ -151,10 +151,10 @@ def targets(
     folders: bool = False,
     only: Collection[str] | None = None,
 ) -> list[OutputTarget]:
-    """Where each output goes, which is none of the programs nor of the `others` that are read.
+    """The destination of each output; it must be neither a program nor one of the `others` that are read.
 
-    folders  a folder among the inputs stands for all programs below it
-    only     the paths of those programs that are meant; None: all
+    folders  whether a folder among the inputs stands for all programs below it
+    only     paths of the programs that are meant; None: all
 
     Raises `UsageError` NCF003 ... NCF016 before anything is computed or written.
     """
@@ -188,10 +188,10 @@ def targets(
 
 
 def check_streams(printed: str | None, **outputs: OutputTarget | None) -> None:
-    """Refuse more than one thing on standard output: NCF010.
+    """Refuse more than one output on standard output: NCF010.
 
-    printed  what goes there in any case, in words; None if nothing does
-    outputs  by their names, where the others go; None of one that is not asked for
+    printed  name of what is always printed there; None: nothing
+    outputs  other outputs by name; None if not wanted
     """
     streamed = [f"the {name}" for name, target in outputs.items() if target is not None and target.path == STREAM]
     if printed is not None:
@@ -214,7 +214,7 @@ def _target(program: ProgramFile, outputs: Outputs, folder: str | None) -> Outpu
 
 
 def _check_clash(found: Sequence[OutputTarget]) -> None:
-    """Refuse outputs that are one file, here or on a computer that does not tell large letters from small ones."""
+    """Refuse outputs that are the same file, also on file systems that ignore the case of names."""
     same: dict[object, list[OutputTarget]] = {}
     for target in found:
         same.setdefault((target.in_place and identity(target.path)) or folded_name(target.path), []).append(target)

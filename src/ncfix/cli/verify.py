@@ -28,14 +28,14 @@ if TYPE_CHECKING:
     from ncfix.text.tree import Program
 
 Said = tuple[Sequence[Message], ...]
-"""What there is to say of following the original, and the other."""
+"""Messages from following the original and the corrected program."""
 FEW = 5
-"""Lines that are named by their numbers."""
+"""Largest number of lines that are listed by number."""
 
 
 @frozen
 class ProgramPair:
-    """The two texts, and what is needed to follow them."""
+    """The two programs, and what is needed to follow them."""
 
     following: FollowingSetup
     original: Source
@@ -43,13 +43,13 @@ class ProgramPair:
     tolerance_um: float
 
     def compared(self) -> tuple[Sequence[RunningComparison], Said]:
-        """What this machine does with the two, measured against what the first one means, in each position of block
-        delete; what is said of following them.
+        """The comparison of both paths on this machine with the path intended by the original, for each position of
+        block delete; and the messages from following them.
         """
         return through((self.original, self.fixed), self._in_parts, self._as_wholes)
 
     def _in_parts(self) -> tuple[Sequence[RunningComparison], Said]:
-        """While they are read; raises what that does, `NotInPartsError` and `NearestNotHereError`."""
+        """Compare while reading; raises errors of reading, `NotInPartsError` and `NearestNotHereError`."""
         from ncfix.compensate.figures.comparison import CutPaths
 
         dialect = dialect_in(self.following, self.original)
@@ -81,14 +81,14 @@ class ProgramPair:
         return RunningComparison(self.tolerance_um / 1e3, rounding(there))
 
     def _read(self, source: Source, like: Program | None = None) -> Program:
-        """A program; one from a file in the dialect of another one, if it can be."""
+        """A program; one from a file is read in the dialect of `like`, if possible."""
         text, following = source.everything(), self.following
         like = None if source.path == STREAM else like
         return read_program(source.path, following.dialect, following.machine, text, like)
 
 
 def compared(following: FollowingSetup, original: str, fixed: str, tolerance_um: float) -> Compared:
-    """What this machine does with two programs, measured against what the first one means."""
+    """Compare both programs on this machine with the path intended by the original; prints the messages."""
     with source_of(original) as first, source_of(fixed) as second:
         beside, messages = ProgramPair(following, first, second, tolerance_um).compared()
         tell_of_stamp(first)
@@ -163,7 +163,7 @@ def verify(
 
 
 def verdict(found: Compared, tolerance_um: float) -> Iterator[str]:
-    """What was found, for people."""
+    """The result in words."""
     at = " of the original" if found.before.get("where") else ""
     yield f"tip error before: {console.error_figures(found.before)}{at}"
     yield f"tip error after:  {console.error_figures(found.after)}"
@@ -188,7 +188,7 @@ def verdict(found: Compared, tolerance_um: float) -> Iterator[str]:
 
 
 def unsure(limits: str) -> str:
-    """The verdict where all that was looked at is right, and not all could be."""
+    """The verdict if all examined motions are right, but not all could be examined."""
     return f"NOT known to be within {limits}: what was looked at is, and the rest may not be"
 
 

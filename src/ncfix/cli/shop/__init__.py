@@ -1,1 +1,1 @@
-"""What a shop leaves running: batches, folders that are watched, the project file that saves options."""
+"""Batches, watched folders and project files."""

@@ -1,6 +1,6 @@
-"""The programs of `ncfix fix`, each corrected and written: one after another or several at a time.
+"""Corrects and writes the programs of `ncfix fix`, one after another or several at a time.
 
-They are done from the start, or from where it stopped.
+A batch starts from the beginning, or continues where an earlier run stopped.
 """
 
 from __future__ import annotations
@@ -43,24 +43,24 @@ if TYPE_CHECKING:
 
 FLATTEN = "--flatten may correct more: it writes out what cycles, loops and subprograms repeat; "
 REPEATED = "NCF433"
-"""Refused since it is executed several times, or for the sake of such a block."""
+"""Code of a refusal because a block is executed several times, or because it affects such a block."""
 STALE = "is of an earlier state of the program, the machine, the set-up or the options, and was left as it is"
 ACCEPT = "--allow-refused writes the program with the refused motions as they were"
 OF_PROGRAMS = 100
-"""Messages with this number and above are about programs, machines and set-ups; those below about files and use."""
+"""Smallest number of message codes on programs, machines and setups; lower ones are on files and usage."""
 LASTING = frozenset({"NCF017", "NCF024", "NCF030"})
-"""Programs that take too much time or memory: that would come again, and cost as much again."""
+"""Codes of failures by lack of time or memory, which would occur again at the same cost."""
 
 
 @frozen
 class FixOutcome:
-    """What became of one program.
+    """The result of one program.
 
-    code    the exit code
-    entry   its entry in the JSON object
-    called  the subprograms looked for, as in the journal
-    key     what the result depends on, see `FixJob.key`; empty if it is not asked for, or has changed meanwhile
-    digest  of the output, if there is one and it is asked for
+    code    exit code
+    entry   entry in the JSON object
+    called  subprograms that were looked for, as in the journal
+    key     digest of what the result depends on, see `FixJob.key`; empty without a journal, or if it changed meanwhile
+    digest  digest of the output, if there is one and it is needed
     """
 
     code: int
@@ -71,13 +71,13 @@ class FixOutcome:
 
     @classmethod
     def failed(cls, target: OutputTarget, error: NcfixError) -> FixOutcome:
-        """A program that ended in an error."""
+        """The result of a program that ended in an error."""
         entry = {"path": shown(target.source), "output": None}
         return cls(error.exit_code, {**entry, "errors": [message.as_dict() for message in error.messages]})
 
     @classmethod
     def left_out(cls, target: OutputTarget, why: Message) -> FixOutcome:
-        """A subprogram in a folder, which is corrected in the programs that call it."""
+        """The result of a subprogram in a folder, which is corrected in the programs that call it."""
         reason = {"line": 0, "code": why.code, "reason": why.text}
         entry: dict[str, Any] = {
             "path": shown(target.source),
@@ -91,7 +91,7 @@ class FixOutcome:
 
 @frozen
 class ProgramLimits:
-    """How much time and memory a program may take; None: as much as there is."""
+    """Largest time and memory for one program; None: unlimited."""
 
     seconds: float | None = None
     megabytes: int | None = None
@@ -102,13 +102,13 @@ class ProgramLimits:
 
 @frozen
 class FixJob:
-    """What is the same for all programs.
+    """The settings common to all programs.
 
-    pages    where pages of programs go; None: there are none
-    journal  where outputs are announced; None: nowhere
-    certify  the machine file, if a certificate is to stand beside each output; empty: none
-    basis    a digest of all that a result depends on besides program and subprograms, with a journal
-    verbose  the dialect of each program is said, too
+    pages    destinations of program pages; None: no pages
+    journal  path of the journal; None: no journal
+    certify  machine file, if a certificate is to be written beside each output; else empty
+    basis    digest of everything a result depends on besides program and subprograms; used with a journal
+    verbose  whether to print the dialect of each program
     """
 
     machine: Machine
@@ -130,16 +130,16 @@ class FixJob:
         return replace(self, journal=journal, basis=text_digest(repr(how).encode()))
 
     def key(self, target: OutputTarget) -> str:
-        """A digest of what the result for a program depends on, subprograms and limits apart."""
+        """Digest of everything the result for a program depends on, except subprograms and limits."""
         return text_digest(f"{self.basis} {digest_of(target.source)}".encode())
 
     def outcome_and_messages(self, target: OutputTarget, jobs: int = 1) -> Finished:
-        """Fix one program elsewhere: what came of it, and what there is to say."""
+        """Correct one program in a worker; returns the result and the messages to print."""
         with console.keeping() as lines:
             return self.outcome(target, jobs), lines
 
     def outcome(self, target: OutputTarget, jobs: int = 1) -> FixOutcome:
-        """Fix one program and say what came of it; an error, and a fault of ncfix, ends this program only."""
+        """Correct one program and report it; an error, even a bug of ncfix, ends only this program."""
         find = RecordingFinder(subprograms(self.setup, target.source))
         key = self.key(target) if self.journal else ""
         try:
@@ -168,7 +168,7 @@ class FixJob:
 
     @contextmanager
     def fixed(self, target: OutputTarget, find: Find, jobs: int) -> Iterator[FixedText]:
-        """The corrected program; a long one is corrected while it is read, if it can be."""
+        """Context with the corrected program; a long one is corrected while it is read, if possible."""
         with source_of(target.source) as source:
             long = source.looked_into(named=self.dialect is not None)
             if not long or self.options.flatten:
@@ -191,7 +191,7 @@ class FixJob:
         return FixedText(found.text, found.changed, report, program.dialect.name, page)
 
     def _remarked(self, report: FixReport, dialect: Dialect) -> FixReport:
-        """With a remark (NCF106) where the program shows another control than the machine file names."""
+        """The report with a warning (NCF106) if the program is for another control than the machine file names."""
         from ncfix.text.dialect import other_control
 
         remark = None if self.dialect else other_control(dialect, self.machine.control or "", report.path)
@@ -278,7 +278,7 @@ class FixJob:
 
 
 def _recorded(fixed: Fixed) -> PathRecord:
-    """What is to be shown of a program that was corrected as a whole."""
+    """The data for the page of a program that was corrected as a whole."""
     from ncfix.compensate.figures.path_record import PathRecord
 
     record = PathRecord()
@@ -291,12 +291,12 @@ def _recorded(fixed: Fixed) -> PathRecord:
 
 @cache
 def _let_stay() -> None:
-    """Spare the garbage collector what is loaded by now, once in a process: it stays, and is much to go through."""
+    """Exclude all objects loaded so far from garbage collection, once per process: they stay, and are many."""
     gc.freeze()
 
 
 def _with_lines(messages: Sequence[Message], source: str) -> list[Message]:
-    """Messages, those on lines of a program file with these lines."""
+    """Messages, with the program's lines added to those that lack them."""
     bare = [(each, each.place if each.place and _is_bare(each.place, shown(source)) else None) for each in messages]
     wanted = {place.line for _, place in bare if place}
     if not wanted or not os.path.isfile(source):
@@ -307,12 +307,12 @@ def _with_lines(messages: Sequence[Message], source: str) -> list[Message]:
 
 
 def _is_bare(place: Place, path: str) -> bool:
-    """Whether a place is a line of this file, and does not show it."""
+    """Whether a place is a line of this file, without the text of the line."""
     return place.path == path and place.line > 0 and not place.text
 
 
 def _summary(entry: dict[str, Any], refused: bool, errors: bool) -> list[str]:
-    """What was done, for people; `errors`: the machine has some."""
+    """The summary of a corrected program for people; `errors`: whether the machine has any."""
     output = "nothing written" if refused else "<stdout>" if entry["output"] == STREAM else entry["output"]
     counts = f"{entry['compensated']} corrected, {entry['passed']} passed by rule, {len(entry['refused'])} refused"
     lines = [
@@ -343,13 +343,13 @@ def _summary(entry: dict[str, Any], refused: bool, errors: bool) -> list[str]:
 
 @frozen
 class Batch:
-    """Programs that are fixed one after another, or several at a time.
+    """Programs that are corrected one after another, or several at a time.
 
-    folder    where their outputs go together; None: each has its own place
-    resume    what an earlier run has done stays, and what failed then is not tried again
-    retry     what failed is tried again
-    verbosity  how much is said
-    many      they are, perhaps together with others, many programs; None: if they are several
+    folder    common folder of their outputs; None: each has its own destination
+    resume    keep results of an earlier run, and do not repeat what failed then
+    retry     repeat what failed
+    verbosity  how much is printed
+    many      whether they belong to many programs; None: if they are several
     """
 
     job: FixJob
@@ -361,7 +361,7 @@ class Batch:
     many: bool | None = None
 
     def run(self, jobs: int, make: ExecutorMaker) -> Iterator[FixOutcome]:
-        """What becomes of them, in their order; each is noted as soon as it is done."""
+        """The results in the order of the programs; each is recorded as soon as it is available."""
         several = len(self.targets) > 1
         if self.folder is None or not (self.resume or several or os.path.exists(os.path.join(self.folder, JOURNAL))):
             yield from self._told(self.targets, {}, self._fresh(self.job, self.targets, jobs, make, lambda *_: None))
@@ -384,7 +384,7 @@ class Batch:
     def _told(
         self, targets: Sequence[OutputTarget], before: Mapping[OutputTarget, JournalRecord], fresh: Iterator[Finished]
     ) -> Iterator[FixOutcome]:
-        """All outcomes in their order, each with what there is to say of it."""
+        """All results in order; prints the messages of each."""
         reporter = OutcomeReporter(self.verbosity, self._many)
         with progress(len(targets)) as step:
             for target in targets:
@@ -397,7 +397,7 @@ class Batch:
                 yield outcome
 
     def _record_of(self, job: FixJob, target: OutputTarget, journal: Journal) -> JournalRecord | None:
-        """The record of a program that need not be fixed again; None if it is to be fixed."""
+        """The record of a program that need not be corrected again; None if it must be."""
         record = journal.records.get(target.name) if self.resume else None
         if record is None or (self.retry and not record.digest):
             return None
@@ -423,12 +423,12 @@ class Batch:
 
 
 Finished = tuple[FixOutcome, list[str]]
-"""What became of a program, and what is still to be said of it."""
+"""The result of a program, and messages that are still to be printed."""
 Note = Callable[[OutputTarget, Finished], None]
 
 
 def _note(journal: Journal, limits: str, target: OutputTarget, finished: Finished) -> None:
-    """Put into a journal what became of a program, unless something else than what the key holds may be the reason."""
+    """Record a result in the journal, unless it may depend on something that the key does not cover."""
     outcome, _ = finished
     codes = [error["code"] for error in outcome.entry.get("errors", ())]
     faulty = outcome.code == ExitCode.FAULT
@@ -447,7 +447,7 @@ def _done_before(target: OutputTarget, record: JournalRecord) -> Finished:
 
 
 def _lost(target: OutputTarget) -> Finished:
-    """What to say of a program over which two processes died: too large for the memory, or a fault in compiled code."""
+    """The result of a program whose worker died twice: too little memory, or a bug in compiled code."""
     text = "the process that worked on it was killed, and so was another one"
     error = FaultError.of("NCF017", text, Place(shown(target.source)), "fix it alone, where there is more memory")
     return FixOutcome.failed(target, error), [str(message) for message in error.messages]

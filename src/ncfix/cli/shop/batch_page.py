@@ -1,4 +1,4 @@
-"""The page of a batch: what became of its programs and why, in totals and in a list to sort and filter."""
+"""The HTML page of a batch: results and their reasons, as totals and as a list to sort and filter."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ncfix.reports.pages import asset, card, filled, table
 from ncfix.version import __version__
 
 Entry = Mapping[str, Any]
-"""A program in what `ncfix fix --json` prints."""
+"""A program's entry in the output of `ncfix fix --json`."""
 HEADER = (
     "program",
     "outcome",
@@ -28,13 +28,13 @@ HEADER = (
     "why, remarks",
 )
 FIGURES = (2, 3, 4, 5, 6)
-"""Columns of numbers."""
+"""Indices of columns with numbers."""
 MOST = 20
-"""So many reasons and remarks of a program are shown; all are counted."""
+"""Largest number of reasons and remarks shown for a program; all are counted."""
 
 
 def batch_page(entries: Sequence[Entry], folder: str = "", title: str = "Batch of programs") -> bytes:
-    """The page; links lead from `folder`, where it stands, to the pages of programs."""
+    """The page; links to pages of programs are relative to its `folder`."""
     summary = Summary()
     for entry in entries:
         summary.add(entry)
@@ -120,7 +120,7 @@ def _row(entry: Entry, folder: str) -> str:
 
 
 def _said(wrong: Sequence[tuple[str, str]], remarks: Sequence[tuple[str, str]]) -> str:
-    """The first reason at once; the others and the remarks by their codes, and in full where they are unfolded."""
+    """The first reason; further reasons and the remarks as a list of codes that unfolds to the full texts."""
     lines = [f"{escape(code)}: {escape(visible(why.splitlines()[0]))}" for code, why in (*wrong, *remarks)]
     first, rest = (lines[0], lines[1:]) if wrong else ("", lines)
     if not rest:

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from ncfix.text.dialect import Dialect
 
 SUFFIX = ".certificate.json"
-"""Of the certificate beside a corrected program."""
+"""Suffix of the certificate beside a corrected program."""
 
 
 def given_of(setup: Setup, dialect: Dialect) -> Given:
-    """What the setup says that the second reader knows of."""
+    """The data of the setup in the form of the second reader."""
     from ncfix.certificate.following import Given
 
     tools: dict[int | str, float | None] = {number: tool.length for number, tool in setup.tools.items()}
@@ -46,7 +46,7 @@ def given_of(setup: Setup, dialect: Dialect) -> Given:
 
 @frozen
 class Proving:
-    """What the correction of a program is proved by; `dialect`: if it was said."""
+    """What a correction is proved with; `dialect`: if given by option."""
 
     machine: Machine
     machine_path: str
@@ -55,7 +55,7 @@ class Proving:
     tolerance_um: float
 
     def certificate(self, original: str, fixed: str) -> dict[str, Any]:
-        """The certificate of a correction, of both programs as they are in their files."""
+        """The certificate of a correction, from both programs as they are in their files."""
         from ncfix.certificate.certificate import Subject
 
         before, after, machine_file = ((shown(path), read(path)) for path in (original, fixed, self.machine_path))
@@ -76,7 +76,7 @@ class Proving:
 def verify_certificate(
     proving: Proving, original: str, fixed: str, output: str | None, against: str | None, as_json: bool
 ) -> int:
-    """Prove a corrected program by the second reader; write the certificate, or compare it with an earlier one."""
+    """Prove a corrected program with the second reader; write the certificate, or compare it with an earlier one."""
     from ncfix.certificate.certificate import FAULTY, differences, dumps, loads, said
 
     earlier = None if against is None else loads(read(against), shown(against))
@@ -95,7 +95,7 @@ def verify_certificate(
 
 
 def certify_output(proving: Proving, target: OutputTarget) -> dict[str, Any]:
-    """Prove what was written for a program as it is on the disk, and write its certificate beside it."""
+    """Prove an output as it is on disk, and write its certificate beside it."""
     from ncfix.certificate.certificate import FAULTY, dumps
 
     found = proving.certificate(target.backup if target.in_place else target.source, target.path)

@@ -1,4 +1,4 @@
-"""`ncfix fix --diff`: what a correction would change, as text or as motions; nothing is written."""
+"""`ncfix fix --diff`: shows what a correction would change, as text or as motions; writes nothing."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ COLUMNS = ("line", "axis", "from", "to", "change", "why")
 
 
 def show_changes(job: FixJob, program: ProgramFile, motions: bool, as_json: bool) -> tuple[int, dict[str, Any]]:
-    """Print what would change in a program; the exit code, and the entry in the JSON object."""
+    """Print what would change in a program; returns the exit code and the entry in the JSON object."""
     from ncfix.compensate.changes import Changes, as_plain
     from ncfix.text.reader import read as read_source
 

@@ -1,7 +1,7 @@
-"""Where pages and pictures of programs go: `ncfix fix --report`, `--plot`, and `ncfix report PROGRAM -m MACHINE`.
+"""Destinations of pages and pictures of programs: `ncfix fix --report`, `--plot`, `ncfix report PROGRAM -m MACHINE`.
 
-Of one program the page is one file. Of a batch it is a table of all programs, and beside it a folder with the page of
-each, and one copy of the library that draws. A page of ncfix's own is replaced, any other file is not.
+For one program the page is one file. For a batch it is a table of all programs, with a folder beside it that contains
+each program's page and one copy of the plotting library. Only pages made by ncfix are replaced, no other files.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 class Pages:
     """Pages of programs.
 
-    page   the file of the one program, or of the batch; None: none
-    plot   the picture of the one program; None: none
-    many   it is a batch
-    force  files that are no pages are replaced, too
+    page   file for the page of the program, or of the batch; None: no page
+    plot   file for the picture of the program; None: no picture
+    many   whether it is a batch
+    force  whether other files may be replaced, too
     """
 
     page: str | None
@@ -46,9 +46,9 @@ class Pages:
         targets: Sequence[OutputTarget],
         read: Sequence[str | None],
     ) -> Pages:
-        """The pages that are asked for. Raises `UsageError` if they cannot be, before anything is done.
+        """The pages that are asked for. Raises `UsageError` if they cannot be written, before anything is computed.
 
-        targets  where the programs come from and go to
+        targets  sources and destinations of the programs
         read     other inputs
         """
         if plot is not None and many:
@@ -68,7 +68,7 @@ class Pages:
         return found
 
     def check_replaced(self, path: str) -> None:
-        """Refuse to replace a file that is no page of ncfix's: NCF004."""
+        """Refuse to replace a file that is not a page made by ncfix: NCF004."""
         from ncfix.reports.pages import is_own
 
         if os.path.lexists(path) and not (self.force or (path != self.plot and is_own(path))):
@@ -76,18 +76,18 @@ class Pages:
 
     @property
     def folder(self) -> str:
-        """Where the pages of a batch are."""
+        """Folder for the pages of a batch."""
         assert self.page is not None
         return f"{os.path.splitext(self.page)[0]}-pages"
 
     def path_of(self, target: OutputTarget) -> str | None:
-        """Where the page of a program goes."""
+        """Path of a program's page."""
         if self.page is None or not self.many:
             return self.page
         return os.path.join(self.folder, f"{target.name or os.path.basename(target.source)}.html")
 
     def has(self, target: OutputTarget) -> bool:
-        """Whether there is a page of a program already."""
+        """Whether a program's page exists already."""
         path = self.path_of(target)
         return path is not None and os.path.exists(path)
 
@@ -134,7 +134,7 @@ def _check_page(path: str) -> None:
 
 
 def check_plot(path: str) -> None:
-    """Raises `UsageError` NCF018 and NCF031 where no picture can be drawn into such a file."""
+    """Raise `UsageError` NCF018 or NCF031 if no picture can be written to this file."""
     from ncfix.reports.picture import FORMS, require_matplotlib
 
     if _suffix(path) not in FORMS:

@@ -1,7 +1,7 @@
-"""The project file on the command line: what `ncfix.toml` says are defaults of options; `ncfix init` writes one.
+"""The project file on the command line: its settings are defaults of options; `ncfix init` writes one.
 
-An option on the command line wins over the environment (`NCFIX_MACHINE`, `NCFIX_SETUP`, `NCFIX_OUTPUT`,
-`NCFIX_DIALECT`), and that over the file. Programs for which the file says different things are done in groups.
+The command line overrides the environment (`NCFIX_MACHINE`, `NCFIX_SETUP`, `NCFIX_OUTPUT`, `NCFIX_DIALECT`), which
+overrides the file. Programs with different settings are processed in groups.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ if TYPE_CHECKING:
     from ncfix.project import Project
 
 COMMAND_LINE_ONLY = frozenset({"force", "in_place", "executor", "report", "plot"})
-"""Options that write other files, replace some, or have programs worked on elsewhere: they are said anew each time.
+"""Options that a project file cannot set, because they write or replace other files or run programs elsewhere.
 
 A project file may come with programs from anywhere.
 """
 QUIET = "ncfix.quiet"
-"""Whether a context says only what went wrong."""
+"""Key in the context: whether only failures are printed."""
 STATE = "ncfix.groups"
-"""Where a context keeps the groups of programs."""
+"""Key in the context for the groups of programs."""
 
 
 @frozen
 class ProgramGroup:
-    """Programs for which the same holds.
+    """Programs with the same settings.
 
-    settings  defaults of parameters, by their names
+    settings  parameter name -> default
     programs  their paths; None: all that are given
-    folder    of the project file; None: there is none
+    folder    folder of the project file; None: no project file
     """
 
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -57,15 +57,15 @@ class _Groups:
 
 
 class ProjectCommand(click.Command):
-    """A verb on programs; what the project file says of its options are defaults.
+    """A verb on programs; the settings of the project file are defaults of its options.
 
-    not_of_it  options by their names in a project file that mean something else for this verb
+    not_of_it  option names that mean something else for this verb than in a project file
     """
 
     not_of_it: ClassVar[frozenset[str]] = frozenset()
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Find the project of the programs first."""
+        """Find the project of the programs, then parse the arguments."""
         if not ctx.resilient_parsing:
             if STATE not in ctx.meta:
                 ctx.meta[STATE] = _Groups(list(args), self._groups(ctx, args))
@@ -84,9 +84,9 @@ class ProjectCommand(click.Command):
         return self._by_settings(given, named if isinstance(named, str) else os.environ.get("NCFIX_PROJECT"))
 
     def _by_settings(self, given: Iterable[str], named: str | None) -> list[ProgramGroup]:
-        """Programs, those below folders each for itself, together if their settings are the same.
+        """The programs in groups of equal settings; programs in folders are looked at one by one.
 
-        What lies in the output folders of a project is no program of it, unless there is nothing else.
+        Programs in the output folders of their project are left out, unless there are no others.
         """
         from ncfix.project import Project
 
@@ -124,7 +124,7 @@ class ProjectCommand(click.Command):
         found.setdefault(key, (project, settings, []))[2].append(program)
 
     def _parameters(self, project: Project, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Settings by the names of parameters; those of other verbs are left out."""
+        """Settings by parameter name, without those for other verbs."""
         own, others = _options(self.params), _all_options()
         found = {}
         for key, value in settings.items():
@@ -145,26 +145,26 @@ class ProjectCommand(click.Command):
 
 
 class TableCommand(ProjectCommand):
-    """A verb that writes a table of a program: where a project wants corrected programs is not where that goes."""
+    """A verb that writes a table about a program, to which the `output` of a project does not apply."""
 
     not_of_it = frozenset({"output"})
 
 
 def tell_of(*projects: Project) -> None:
-    """Say which project files are used, unless little is to be said."""
+    """Print which project files are used, unless the run is quiet."""
     if not click.get_current_context().meta.get(QUIET):
         for project in projects:
             console.say(f"{visible(project.path)}: options that are not given here come from this file")
 
 
 def _options(params: Iterable[click.Parameter]) -> dict[str, click.Option]:
-    """Options by their names as a project file has them."""
+    """Options by the names that a project file uses."""
     options = (param for param in params if isinstance(param, click.Option))
     return {name[2:].replace("-", "_"): option for option in options for name in option.opts if name.startswith("--")}
 
 
 def _all_options() -> frozenset[str]:
-    """The options that a project file may give: those of `ncfix fix`."""
+    """The options that a project file can set: those of `ncfix fix`."""
     root = click.get_current_context().find_root()
     fix = root.command.get_command(root, "fix") if isinstance(root.command, click.Group) else None
     assert fix is not None, "ncfix has that verb"
@@ -172,7 +172,7 @@ def _all_options() -> frozenset[str]:
 
 
 def _taken(option: click.Option, key: str, value: Any, project: Project) -> Any:
-    """The value of an option in a project file as the command line would give it; None for a flag that is off."""
+    """A value from a project file in the form of the command line; None for a flag that is off."""
     if option.is_flag:
         if not isinstance(value, bool):
             raise _wrong(project, key, value, f"{value!r} is neither true nor false")
@@ -203,13 +203,13 @@ def _wrong(project: Project, key: str, value: object, text: str, hint: str = "")
 
 
 def group_of(context: click.Context) -> ProgramGroup:
-    """The programs that this run of a verb is for."""
+    """The programs for which this run of a verb is."""
     groups: _Groups | None = context.meta.get(STATE)
     return groups.found[groups.at] if groups else ProgramGroup()
 
 
 def after_next_groups(context: click.Context) -> int | None:
-    """Run the verb for the groups behind this one; the exit code of the last, which reports on all. None: no more."""
+    """Run the verb for the following groups; returns the exit code of the last, which reports on all. None: no more."""
     groups: _Groups | None = context.meta.get(STATE)
     if groups is None or groups.at + 1 >= len(groups.found):
         return None
@@ -219,12 +219,12 @@ def after_next_groups(context: click.Context) -> int | None:
 
 
 def is_from_file(context: click.Context, option: str) -> bool:
-    """Whether it is the project file which gives the value of an option."""
+    """Whether the value of an option comes from the project file."""
     return context.get_parameter_source(option) == click.core.ParameterSource.DEFAULT_MAP
 
 
 def project_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a verb the options that say which project file is used."""
+    """Decorator that adds the options for selecting a project file to a verb."""
     named = click.option(
         "--project",
         type=PATH,
@@ -272,7 +272,7 @@ def init(folder: str, machine: str | None, setup: str | None, output: str | None
 
 
 def _asked(option: str, given: str | None, what: str, default: str | None) -> str:
-    """What was given, else what somebody answers at a terminal; raises `UsageError` NCF001 if nobody is there."""
+    """The given value, else an answer from the terminal or the default; raises `UsageError` NCF001 if there is none."""
     if given is not None:
         return given
     if sys.stdin is None or not sys.stdin.isatty():
@@ -283,7 +283,7 @@ def _asked(option: str, given: str | None, what: str, default: str | None) -> st
 
 
 def _only(folder: str, marks: tuple[str, ...]) -> str:
-    """The only TOML file in a folder in which one of these stands; empty if there is none, or if there are several."""
+    """The only TOML file in a folder with a line that begins with one of `marks`; empty if none or several."""
     found = []
     for name in sorted(os.listdir(folder) if os.path.isdir(folder) else ()):
         if name.endswith(".toml") and os.path.isfile(os.path.join(folder, name)):

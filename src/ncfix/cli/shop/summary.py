@@ -1,7 +1,7 @@
-"""What a batch says: a line for each program that was not written, a table of what became of all, progress meanwhile.
+"""Output of a batch: a line for each program that was not written, a table of all results, and progress.
 
-`ncfix fix` says of one program all that there is to say. Of many it says what somebody has to look at, and how many of
-each kind there are; `--verbose` says all, and the JSON forms have all in any case.
+For a single program `ncfix fix` prints everything. For many it prints what needs attention, and counts of each kind of
+result; `--verbose` prints everything, and the JSON forms always contain everything.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from ncfix.diagnostics import Code, visible
 from ncfix.values import mutable
 
 WIDEST = 60
-"""Characters of an example's name in the table."""
+"""Largest number of characters of an example's name in the table."""
 
 
 class Verbosity(IntEnum):
-    """How much is said of programs."""
+    """How much is printed on programs."""
 
     QUIET = 0
     USUAL = 1
@@ -31,12 +31,12 @@ class Verbosity(IntEnum):
 
     @classmethod
     def of(cls, quiet: bool, verbose: bool) -> Verbosity:
-        """What the options `-q` and `-v` ask for."""
+        """The verbosity for the options `-q` and `-v`."""
         return cls.ALL if verbose else cls.QUIET if quiet else cls.USUAL
 
 
 class OutcomeKind(StrEnum):
-    """What can become of a program, as the table and JSON lines name it."""
+    """Kinds of results, as named in the table and in JSON lines."""
 
     WRITTEN = "written"
     UNCHANGED = "unchanged"
@@ -47,7 +47,7 @@ class OutcomeKind(StrEnum):
 
     @classmethod
     def of(cls, entry: Mapping[str, Any]) -> OutcomeKind:
-        """What became of the program of an entry in the JSON object."""
+        """The kind of the result in an entry of the JSON object."""
         if "errors" in entry:
             return cls.FAILED
         if entry["output"] is None:
@@ -58,14 +58,14 @@ class OutcomeKind(StrEnum):
 
 
 def reasons(entry: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Why a program was not written: codes and what they say of it, the first reason first; empty of one that was."""
+    """Code and text of each reason why a program was not written, the first reason first; empty if it was."""
     if "errors" in entry:
         return [(error["code"], error["text"]) for error in entry["errors"]]
     return [] if entry["output"] is not None else [(each["code"], each["reason"]) for each in entry["refused"]]
 
 
 def brief(entry: Mapping[str, Any]) -> str:
-    """A program that was not written, on one line."""
+    """The reason why a program was not written, in one line."""
     (code, text), *more = reasons(entry)
     found = entry.get("errors") or entry["refused"]
     line = f":{found[0]['line']}" if found[0].get("line") else ""
@@ -77,10 +77,10 @@ def brief(entry: Mapping[str, Any]) -> str:
 
 @mutable
 class Summary:
-    """Counts of what became of programs, and why.
+    """Counts of results and their reasons.
 
-    outcomes  how many programs, by outcome and code, "" for none, with the first of them
-    remarks   how many written programs have a remark of a code
+    outcomes  (kind, code or "") -> number of programs, and the first of them
+    remarks   code -> number of written programs with such a remark
     """
 
     outcomes: dict[tuple[OutcomeKind, str], list[Any]] = field(default_factory=dict)
@@ -104,7 +104,7 @@ class Summary:
         return {"programs": self.count, "written": self.written, "outcomes": rows, "remarks": dict(self.remarks)}
 
     def lines(self, titles: Mapping[str, Code]) -> list[str]:
-        """The table, for people; `titles`: what the codes mean."""
+        """The table for people; `titles`: explanations of the codes."""
         rows = [("programs", "outcome", "reason")]
         for became, code, count, first in self._rows():
             example = f" ({visible(first)[-WIDEST:]}{' ...' if count > 1 else ''})" if code else ""
@@ -125,12 +125,12 @@ def _title(titles: Mapping[str, Code], code: str) -> str:
 
 
 Advance = Callable[[], None]
-"""Says that one program more is done."""
+"""Called when one more program is finished."""
 
 
 @contextmanager
 def progress(total: int) -> Iterator[Advance]:
-    """Show on a terminal how many of so many programs are done, how many a second, and how long the rest takes."""
+    """Context that shows the progress on a terminal: programs finished, rate, remaining time."""
     if total == 1 or sys.stderr is None or not sys.stderr.isatty():
         yield lambda: None
         return
@@ -152,10 +152,10 @@ def progress(total: int) -> Iterator[Advance]:
 
 @mutable
 class OutcomeReporter:
-    """Says what there is to say of programs that are done.
+    """Prints the messages of finished programs.
 
-    many  they are many: of each of which nothing was written there is a line, at most `console.MOST` for each reason;
-          all that there is to say of it where tracebacks are asked for
+    many  whether there are many programs: then each one that was not written gets one line, at most `console.MOST`
+          lines for each reason; with tracebacks enabled, all messages of such a program are printed
     """
 
     verbosity: Verbosity
@@ -163,7 +163,7 @@ class OutcomeReporter:
     seen: Counter[str] = field(default_factory=Counter)
 
     def report(self, entry: Mapping[str, Any], lines: list[str]) -> None:
-        """Say what there is to say of one of them; `said`: all of it."""
+        """Print what is wanted of one program; `lines`: all its messages."""
         wrong = reasons(entry)
         everything = self.verbosity == Verbosity.ALL or (bool(wrong) and console.is_debugging())
         if everything or (not self.many and (self.verbosity == Verbosity.USUAL or wrong)):

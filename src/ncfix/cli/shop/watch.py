@@ -1,4 +1,4 @@
-"""`ncfix watch IN OUT`: programs that come into a folder are corrected when they are complete."""
+"""`ncfix watch IN OUT`: corrects programs that are copied into a folder, each when it is complete."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 HEAD = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><meta http-equiv="refresh" content="5">
 <meta name="viewport" content="width=device-width"><title>ncfix watch</title>"""
-"""How each status page begins, and nothing else."""
+"""Beginning of every status page, by which it is recognised."""
 LAST = 200
-"""So many programs are on the status page."""
+"""Largest number of programs on the status page."""
 STYLE = """:root { color-scheme: light dark; font: 15px/1.4 system-ui, sans-serif }
 body { max-width: 70em; margin: 1.5em auto; padding: 0 1em }
 table { border-collapse: collapse; width: 100% } th, td { text-align: left; padding: .3em .8em .3em 0 }
@@ -45,11 +45,11 @@ TAKEN = frozenset(
         *("allow_refused", "verify", "jobs", "executor", "time_limit_s", "memory_limit_mb"),
     }
 )
-"""Parameters of `fix` that `watch` has, too, besides those of the setup."""
+"""Parameters of `fix` that `watch` has, too, in addition to those of the setup."""
 
 
 class FolderCommand(ProjectCommand):
-    """A verb on a folder, for which the project file of the folder holds as a whole."""
+    """A verb on a folder, to which the project file of that folder applies as a whole."""
 
     def _by_settings(self, given: Iterable[str], named: str | None) -> list[ProgramGroup]:
         from ncfix.project import Project
@@ -64,10 +64,10 @@ class FolderCommand(ProjectCommand):
 
 @mutable
 class StatusPage:
-    """What has become of the programs since the start, as a page that a browser reads again and again.
+    """The results since the start, as a page that a browser reloads regularly.
 
-    path  of the page; None: there is none
-    lost  why it could not be written last; empty if it was
+    path  file of the page; None: no page
+    lost  why the last attempt to write it failed; empty if it succeeded
     """
 
     path: str | None
@@ -78,7 +78,7 @@ class StatusPage:
     lost: str = ""
 
     def check(self, inputs: Iterable[str]) -> None:
-        """Refuse to write the page in the place of an input, or of a file that is no status page.
+        """Refuse to replace an input, or a file that is no status page.
 
         Raises `UsageError` NCF003, NCF004, NCF005, NCF007, NCF018, NCF023.
         """
@@ -92,12 +92,12 @@ class StatusPage:
             raise UsageError.of("NCF004", text, Place(self.path), "give the page another name")
 
     def add(self, entry: Mapping[str, Any]) -> None:
-        """Take in what became of a program."""
+        """Add the result of a program."""
         self.counts[OutcomeKind.of(entry)] += 1
         self.last = [(time.time(), entry), *self.last[: LAST - 1]]
 
     def write(self) -> None:
-        """Write the page anew; programs are corrected all the same if that cannot be, which is said once."""
+        """Rewrite the page; a failure is reported once and does not stop the corrections."""
         if self.path is None:
             return
         try:
@@ -109,7 +109,7 @@ class StatusPage:
                 self.lost = str(error)
 
     def text(self) -> str:
-        """The page."""
+        """The page as HTML."""
         rows = "\n".join(self._row(at, entry) for at, entry in self.last)
         counts = ", ".join(f"{count} {became}" for became, count in sorted(self.counts.items())) or "no program yet"
         trouble = f'<p class="failed">{escape(visible(self.trouble, lines=True))}</p>' if self.trouble else ""
@@ -230,7 +230,7 @@ class _Watching:
     verbosity: Verbosity
 
     def corrected(self, machine_path: str, inputs: Iterable[str], ready: list[str], page: StatusPage) -> int:
-        """Correct programs, and say what became of them; the worst exit code."""
+        """Correct the programs that are ready and report their results; returns the worst exit code."""
         from ncfix.batch.work import executor_of
         from ncfix.cli.shop.batch import Batch
 
