@@ -1,4 +1,4 @@
-"""The certificate: what was proved of which files, as JSON, and whether it still holds."""
+"""The certificate: the result of a proof for certain files, as JSON, and the check whether it still holds."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from ncfix.version import __version__
 
 SCHEMA = 1
 MOST = 1000
-"""Faults that a certificate lists."""
+"""Largest number of faults that a certificate lists."""
 PROVED, PARTLY, FAULTY = "proved", "proved in part", "faulty"
 HELD = ("original", "corrected", "machine", "setup_sha256", "dialect")
-"""What has to be the same for a certificate to be about these files."""
+"""Keys that identify the files of a certificate."""
 FOUND = ("verdict", "blocks", "motions", "proved", "proved_motions")
-"""What has to come out again."""
+"""Keys of the result, which a repeated proof must confirm."""
 
 
 @frozen
 class Subject:
-    """What a certificate is about: names and contents of the files, and what the program cannot know.
+    """The subject of a certificate: names and contents of the files, and the values outside the program.
 
-    dialect  of the program, by its name
-    family   the dialect of which that is a variant, or that dialect
+    dialect  name of the dialect of the program
+    family   name of the dialect of which that is a variant, or that dialect
     """
 
     original: tuple[str, bytes]
@@ -44,7 +44,7 @@ class Subject:
     tolerance_um: float
 
     def certificate(self) -> dict[str, Any]:
-        """Prove it, and say so."""
+        """Prove the program, and return the certificate."""
         proof = prove(self.original[1], self.corrected[1], self.machine, self.given, self.family, self.tolerance_um)
         stamp = proof.stamp
         return {
@@ -88,7 +88,7 @@ def _file(path: str, content: bytes) -> dict[str, str]:
 
 
 def _in_order(value: Any) -> Any:
-    """Mappings by key, numbers before names: of tools, both may occur."""
+    """The value with mappings sorted by key, numbers before names; tools may have both."""
     if not isinstance(value, Mapping):
         return value
     return {key: _in_order(value[key]) for key in sorted(value, key=lambda key: (isinstance(key, str), key))}
@@ -99,7 +99,7 @@ def _digest(content: bytes) -> str:
 
 
 def said(certificate: Mapping[str, Any]) -> Iterator[str]:
-    """A certificate for people."""
+    """The lines of a certificate as text for people."""
     motions, blocks = certificate["motions"], certificate["blocks"]
     yield f"certificate: {certificate['verdict']}"
     yield (
@@ -143,7 +143,7 @@ def loads(text: bytes, path: str) -> dict[str, Any]:
 
 
 def differences(certificate: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
-    """Why a certificate is not about what was proved now, or does not hold any more; nothing if it does."""
+    """The differences between a certificate and the proof made now; none if the certificate holds."""
     titles = {"original": "the original", "corrected": "the corrected program", "machine": "the machine file"}
     for name, title in titles.items():
         if certificate[name]["sha256"] != now[name]["sha256"]:

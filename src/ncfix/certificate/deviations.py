@@ -1,4 +1,4 @@
-"""How far the tip is from the intended way where a motion, or a piece of one, has got to."""
+"""Deviations of the tip from the intended path along motions and their pieces."""
 
 from __future__ import annotations
 
@@ -18,21 +18,22 @@ from ncfix.certificate.steps import AxisStep, Kind
 from ncfix.certificate.text import Indices
 
 MANY, FEW = 11, 3
-"""At so many places on a motion, or a piece of one, its way is looked at: on long and on short ones."""
+"""Number of samples on a long, and on a short, motion or piece."""
 ASIDE = math.radians(0.09)
-"""From here on even turns of axes lead the tool out of its plane, and `fix` may leave a motion in one piece."""
+"""Deviation, rad, of the tool from its plane by evenly turning axes, above which `fix` may leave a motion in one piece.
+"""
 HALF_TURN = 179.5
-"""Degrees; a correction may make half a turn of as much."""
+"""Turn, degrees, that a correction may change into half a turn or more."""
 WIDER = 1.05
-"""Of the tolerance: a way farther out is beyond it for sure."""
+"""Factor of the tolerance above which a way is surely beyond it."""
 
 
 class Moved(NamedTuple):
-    """Motions of the original, and the pieces in their places: steps by their indices, pairs (m,) one behind the other.
+    """m motions of the original, in order, and the pieces that replace them.
 
-    row, first, last  lines, as in `LinePair`
-    ours              (m,) step of the original
-    begin, stop       (m,) the first of its pieces, and behind the last, among the steps of the corrected program
+    row, first, last  (m,) lines, as in `LinePair`
+    ours              (m,) numbers of the steps of the original
+    begin, stop       (m,) numbers of the first piece, and of that behind the last, in the steps of the correction
     """
 
     row: Indices
@@ -43,31 +44,31 @@ class Moved(NamedTuple):
     stop: Indices
 
     def where(self, which: Mask | Indices) -> Moved:
-        """Some of them."""
+        """The motions `which`."""
         return Moved(*(each[which] for each in self))
 
     @property
     def owner(self) -> Indices:
-        """Which motion each piece belongs to."""
+        """For each piece, the index of its motion."""
         return np.repeat(np.arange(len(self.row)), self.stop - self.begin)
 
     @property
     def pieces(self) -> Indices:
-        """All pieces, one behind the other."""
+        """The numbers of the steps of all pieces, in order."""
         counts = self.stop - self.begin
         found: Indices = np.arange(int(counts.sum())) + np.repeat(self.begin - (np.cumsum(counts) - counts), counts)
         return found
 
     def pairs(self) -> Iterator[LinePair]:
-        """Their lines."""
+        """The pairs of lines of the motions."""
         return map(LinePair, self.row.tolist(), self.first.tolist(), self.last.tolist())
 
 
 class Deviations(Expected):
-    """What ways are judged by."""
+    """The deviations and allowances by which motions and their ways are judged."""
 
     def calls_otherwise(self, pair: LinePair, call: HoleCall) -> bool:
-        """Whether the lines for a hole call its cycle in another way than to another depth, or not once."""
+        """Whether the lines of a hole call its cycle not exactly once, or with a change besides its depth."""
         its = [self.calls_there[at] for at in range(pair.first, pair.last + 1) if at in self.calls_there]
         unit = float(self.ours.unit[self.ours.at[pair.row]])
         most = 2.1 * float(self.control_halves(unit).max())  # both numbers are rounded
@@ -76,7 +77,7 @@ class Deviations(Expected):
         return len(its) != 1 or not call.differs_in_depth_only(its[0], most / unit)
 
     def gaps(self, meant: Array, done: Array, rows: Index, given: PoseColumns) -> Array:
-        """How far the tip is from where it is meant to be, mm; with play, on the better side of each axis."""
+        """(k,) distance of the tip from its intended place, mm; with play, on the better side of each axis."""
         assert self.model is not None
         tcp, length, direction = given[0][rows], given[1][rows], given[2][rows]
         sides = [direction]
@@ -89,7 +90,7 @@ class Deviations(Expected):
         return gap
 
     def allowed(self, at: Indices) -> Array:
-        """How far the tip may be from the intended ways of steps (m,), mm: the tolerance, and what digits add."""
+        """(m,) allowed distance of the tip from the intended ways of steps (m,), mm: tolerance plus rounding."""
         units = self.ours.unit[at]
         digits = np.empty(len(at))
         for unit in set(units.tolist()):
@@ -105,7 +106,7 @@ class Deviations(Expected):
         inner: Index,
         given: PoseColumns,
     ) -> Array:
-        """Where on the original motions pieces end: there the expected command is nearest to the written one."""
+        """(k,) shares of the original motions at which pieces `inner` end: where the expected command is nearest."""
         assert self.model is not None
         rows, place = owner[inner], done.end[inner]
         tcp, length, direction = given[0][rows], given[1][rows], given[2][rows]
@@ -123,7 +124,7 @@ class Deviations(Expected):
         return share
 
     def unfollowed(self, step: AxisStep, pieces: Sequence[AxisStep]) -> str:
-        """Why what stands for a motion cannot be followed."""
+        """The reason why the pieces of a motion cannot be judged; "" if there is none."""
         for piece in pieces:
             if piece.why:
                 return piece.why
@@ -136,7 +137,7 @@ class Deviations(Expected):
         return ""
 
     def aside(self, at: Indices) -> Array:
-        """How far even turns of axes lead the tool out of the plane in which it is to turn, of steps (m,), rad."""
+        """(m,) deviation, rad, of the tool, with evenly turning axes, from the plane in which it is to turn."""
         found, some = np.zeros(len(at)), np.flatnonzero(self.ours.by_vector[at])
         if some.size and self.model is not None:
             ways = Ways.of(self.model, self.ours, at[some])
@@ -144,7 +145,7 @@ class Deviations(Expected):
         return found
 
     def worst(self, off: Array, allowed: Array) -> tuple[str, str]:
-        """The axis that is farthest off, and by how much."""
+        """The axis with the largest error relative to the allowance, and that error as text."""
         worst = int(np.argmax(off / allowed))
         amount = float(off[worst])
         size = f"{math.degrees(amount):.4f} degree" if self.machine.rotary[worst] else f"{1e3 * amount:.2f} um"

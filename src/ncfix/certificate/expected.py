@@ -1,4 +1,4 @@
-"""Two programs as the second reader knows them, and where the machine model wants corrected motions to end."""
+"""The steps of two programs, as the second reader follows them, and the expected ends of corrected motions."""
 
 from __future__ import annotations
 
@@ -18,40 +18,40 @@ from ncfix.certificate.text import Indices, Text
 from ncfix.machine import Machine
 
 SLACK = 3e-6
-"""mm; numbers agree to that, apart from digits: the correction is solved to 1 nm."""
+"""Difference, mm, up to which positions agree, besides rounding: the correction is solved to 1 nm."""
 BACK = 1000
-"""Lines before one in which the word is looked for that brought an axis to its place."""
+"""Number of lines that are searched backwards for the word that set the position of an axis."""
 WHOLE_TURN = 2 * math.pi - 1e-9
-"""rad; an arc that turns farther is a full circle: it ends where it begins, which is right to the digit there only."""
+"""Sweep, rad, above which an arc is a full circle: it ends where it begins, and is right to the digit there only."""
 PART = 8192
-"""Steps that are worked out at once."""
+"""Number of steps that are computed at once."""
 KEPT = 1000
-"""Answers that are kept for the same question soon again."""
+"""Number of cached answers."""
 PoseColumns = tuple[Mask, Array, Array]
-"""Of motions: under tool-centre-point control (n,), the length of the tool (n,) mm, directions (n, n_axes)."""
+"""For n motions: (n,) under tool-centre-point control, (n,) tool length, mm, (n, n_axes) directions."""
 
 
 def parts(steps: Indices) -> Iterator[Indices]:
-    """So many of them as are looked at together."""
+    """The steps in batches of `PART`."""
     return (steps[first : first + PART] for first in range(0, len(steps), PART))
 
 
 class Expected:
-    """The steps of an original and of its correction, and where the correction of each should end.
+    """The steps of an original (`ours`, n) and of its correction (`theirs`), and the expected ends of the correction.
 
-    expected    commands at which the corrected steps should end (n, n_axes), mm and rad; NaN where that is not known
-    sure        (n,) it is known
-    directions  the last direction of each axis (n, n_axes); 0 where it has not moved yet, or is not sure
-    one_sided   (n,) of every axis with play it is known how it came there, or that it has not moved yet: then `fix` and
-                this reader take the middle
-    told        (n,) it is known where the line should lead
+    expected    (n, n_axes) commands at which the corrected steps should end, mm and rad; NaN if not known
+    sure        (n,) whether `expected` is known
+    directions  (n, n_axes) the last direction of each axis; 0 if it has not moved yet, or is not sure
+    one_sided   (n,) for every axis with play, its direction is known, or it is known not to have moved yet: then `fix`
+                and this reader assume the middle
+    told        (n,) whether it is known where the corrected line should lead
     """
 
     def __init__(self, first: Text, second: Text, machine: Machine, given: Given, tolerance_um: float = 1.0) -> None:
         self.first, self.second, self.given = first, second, given
         x, y, z = (a + b for a, b in zip(machine.workpiece_offset, given.workpiece_offset, strict=True))
         placed = ((x, y, z), dict(given.inputs))
-        if placed != (machine.workpiece_offset, machine.conditions):  # else what the machine has worked out counts
+        if placed != (machine.workpiece_offset, machine.conditions):  # else keep what the machine has cached
             machine = machine.replace(workpiece_offset=placed[0], conditions=placed[1])
         self.machine = machine
         self.model = TipModel.of(self.machine)
@@ -75,7 +75,7 @@ class Expected:
             self.told &= self.one_sided & (np.abs(self.ours.sweep) <= WHOLE_TURN)
 
     def _expect(self, model: TipModel) -> None:
-        """Work out where corrected motions should end."""
+        """Compute `expected`."""
         ours = self.ours
         known = ours.followed & (ours.kind != Kind.FIXED) & np.isfinite(ours.end).all(axis=1)
         known &= ~ours.tcp | (np.isfinite(ours.length) & bool(ours.tcp.any() and model.leads))
@@ -86,7 +86,7 @@ class Expected:
             self.expected[part] = model.aimed(*self.columns(part))
 
     def _signs(self, model: TipModel, known: Indices) -> None:
-        """The last direction of each axis at the end of each step, as its program means it; 0 where it is not sure."""
+        """Compute `directions` and `one_sided`: the last direction of each axis at the end of each step."""
         ours, n = self.ours, len(self.ours)
         if not self.machine.depends_on_direction:
             self.one_sided[known] = True
@@ -102,7 +102,7 @@ class Expected:
             )
             signs[part] = np.where(np.isfinite(way) & (np.abs(way) > 1e-11), np.sign(way), 0)
             same = (np.abs(lately) < 1e-9) | (np.sign(lately) == np.where(np.abs(at_last) > 1e-11, np.sign(at_last), 0))
-            clear[part] = np.isfinite(way) & same  # and it does not turn round at the end
+            clear[part] = np.isfinite(way) & same  # and it does not reverse at the end
         lost = np.ones(n, dtype=bool)
         lost[known] = False
         goes_on = ~lost[:-1] & ~lost[1:] & (~ours.tcp[:-1] | (ours.length[:-1] == ours.length[1:]))
@@ -120,25 +120,25 @@ class Expected:
         self.directions = np.where(last >= 0, np.take_along_axis(np.where(moves, signs, 0), last, axis=0), 0)
         placed = np.array([name in self.given.initial for name in self.machine.axis_names])
         moved = np.logical_or.accumulate(moves, axis=0)
-        placed_before = np.vstack([placed[None], placed | moved[:-1]])  # else it is only assumed where they stood
+        placed_before = np.vstack([placed[None], placed | moved[:-1]])  # else their positions were only assumed
         breaks = lost[:, None] | ~clear | (moves & ~placed_before)
         last = np.maximum.accumulate(np.where(moves | breaks, index, -1), axis=0)
         sure = (last < 0) | ~np.take_along_axis(breaks, last, axis=0)
         self.one_sided = sure[:, list(self.machine.directed)].all(axis=1)
 
     def ends(self, steps: ProgramSteps, at: Indices) -> Array:
-        """Where some steps (k,) of a program end, (k, n_axes), mm and rad."""
+        """(k, n_axes) ends of steps `at` (k,) of a program, mm and rad."""
         return steps.end[at] * np.where(self.machine.rotary, math.pi / 180, 1.0)
 
     def columns(self, at: Indices) -> tuple[Array, Mask, Array, Array]:
-        """Of steps: ends (n, n_axes), under TCP (n,), tool lengths (n,), directions (n, n_axes)."""
+        """For steps (n,) of the original: ends (n, n_axes), TCP (n,), tool lengths (n,), directions (n, n_axes)."""
         ours = self.ours
         return self.ends(ours, at), ours.tcp[at], np.nan_to_num(ours.length[at]), self.directions[at].astype(np.float64)
 
-    # -- where lines lead -------------------------------------------------------------------------------------------
+    # -- ends of lines ----------------------------------------------------------------------------------------------
 
     def leads_there(self, row: int, at: int) -> bool:
-        """Whether a corrected line leads where the correction of an original one should."""
+        """Whether corrected line `at` leads where the correction of original line `row` should."""
         found = self._leads.get((row, at))
         if found is None:
             if len(self._leads) > KEPT:
@@ -156,7 +156,7 @@ class Expected:
         return bool(self._are_there(np.array([i]), np.array([j]))[0])
 
     def _are_there(self, ours: Indices, theirs: Indices) -> Mask:
-        """Whether corrected steps (k,) lead where the correction of original ones (k,), which is known, should."""
+        """(k,) whether corrected steps lead to the expected ends of original steps (k,), which must be known."""
         units = self.ours.unit[ours]
         near = np.empty((len(ours), len(self.machine.axes)))
         for unit in set(units.tolist()):
@@ -174,7 +174,7 @@ class Expected:
         return there
 
     def _reach(self, unit: float) -> Array:
-        """How near corrected ends are to where they should be, (n_axes,) mm and rad."""
+        """(n_axes,) largest difference of a corrected end from the expected one, mm and rad, to count as equal."""
         found = self._near.get(unit)
         if found is None:
             found = 3 * self.control_halves(unit) + SLACK
@@ -184,9 +184,9 @@ class Expected:
         return found
 
     def lead_there(self, row: int, at: int, count: int) -> int:
-        """How many of so many lines from `row` on lead, one by one, where lines from `at` on do, and surely so.
+        """Number of consecutive lines, at most `count`, of which one from `row` on surely pairs with one from `at` on.
 
-        Behind each of the latter there is another line with a path.
+        Behind each of the latter there must be another line with a path.
         """
         done, size = 0, 16
         while done < count:
@@ -201,7 +201,7 @@ class Expected:
         return done
 
     def _alike(self, line: TextLine, other: TextLine, unit: float) -> bool:
-        """Whether the numbers of two lines differ by corrections only, word by word."""
+        """Whether the words of two lines differ by no more than corrections may be."""
         most = 2.5 * self.machine.max_correction[0] / unit
         for word in line.path:
             found = other.word(word.name)
@@ -213,18 +213,18 @@ class Expected:
         return True
 
     def is_followed(self, row: int) -> bool:
-        """Whether it is known where a line should lead, or that it leads nowhere."""
+        """Whether it is known where an original line should lead, or that it is no motion."""
         at = self.ours.step_of(row)
         return at < 0 or bool(self.told[at])
 
     # -- digits -----------------------------------------------------------------------------------------------------
 
     def half_steps(self, step: AxisStep, piece: AxisStep | None = None, *, added: bool = False) -> Array:
-        """Half of the last digit of each axis, as it is written in a block, (n_axes,) mm and rad.
+        """(n_axes,) half of the last digit of each axis in a block, mm and rad.
 
-        piece  all that stands for the block: where a word of it was left as it is, the control's digits count, to which
-               the control rounds the number
-        added  the numbers stand in an added line, which has the digits of the control only
+        piece  the only line that replaces the block: for a word that was left unchanged, the rounding by the control
+               counts
+        added  the numbers are in an added line, which has the digits of the control only
         """
         found = self.control_halves(step.unit)
         named = {name: word for name, word in step.named.items() if word.value is not None}
@@ -245,9 +245,9 @@ class Expected:
         return self.along(found[None], np.array([self.ours.at[step.row]]))[0]
 
     def unrounded(self, step: AxisStep, piece: AxisStep) -> Array:
-        """How far the control rounds axes that the last line for a block does not name, (n_axes,) mm and rad.
+        """(n_axes,) rounding by the control of axes that the last line of a block does not name, mm and rad.
 
-        That is where the word that brought an axis to its place has more digits than the control.
+        It is not zero if the word that set the position of an axis has more digits than the control.
         """
         digits = self.control_digits(np.array([piece.unit]))[0].tolist()
         found = self.control_halves(piece.unit).copy()
@@ -261,7 +261,7 @@ class Expected:
         return self.along(found[None], np.array([self.ours.at[step.row]]))[0]
 
     def along(self, numbers: Array, at: Indices) -> Array:
-        """How far off numbers of X Y Z (k, n_axes) of steps (k,), which may be turned, lead commands at most."""
+        """(k, n_axes) largest error of commands of steps (k,) by errors (k, n_axes) of their numbers, if turned."""
         turn = self.ours.turn[at]
         if self.model is None or not turn.any():
             return numbers
@@ -270,7 +270,7 @@ class Expected:
         return found
 
     def control_halves(self, unit: float) -> Array:
-        """How far off numbers of axes are at most, rounded to the digits of the control."""
+        """(n_axes,) largest error of numbers that are rounded to the digits of the control, mm and rad."""
         found = self._halves.get((unit,))
         if found is None:
             written = np.zeros((1, len(self.machine.axes)), dtype=np.intp)
@@ -278,21 +278,21 @@ class Expected:
         return found
 
     def control_digits(self, units: Array) -> Index:
-        """Digits behind the point that the control resolves, in blocks with units of so many mm (n,); (n, n_axes)."""
+        """(n, n_axes) number of decimals that the control resolves, in blocks with units (n,), mm."""
         linear, angle = self.machine.least_increment
         counted = np.where((units > 1) & self.given.decimal_inches, 10.0, units)
         least = np.where(self.machine.rotary, angle * 180 / math.pi, linear / counted[:, None])
         return np.maximum(0, np.ceil(-np.log10(least) - 1e-9)).astype(np.intp)
 
     def halves(self, units: Array, written: Index) -> Array:
-        """How far off numbers of axes are at most, with so many digits behind the point (n, n_axes).
+        """(n, n_axes) largest error of rounded numbers with at least these decimals (n, n_axes), mm and rad.
 
-        units  mm, those of the blocks (n,)
+        units  (n,) units of the blocks, mm
         """
         digits = np.maximum(self.control_digits(units), written)
         return 0.5 * 10.0 ** -digits.astype(float) * np.where(self.machine.rotary, math.pi / 180, units[:, None])
 
     def sure_of_side(self, step: AxisStep) -> bool:
-        """Whether the direction of every axis is known on which an error depends."""
+        """Whether the directions of all axes are known on whose direction an error depends."""
         at = self.ours.step_of(step.row)
         return at >= 0 and bool(self.one_sided[at])

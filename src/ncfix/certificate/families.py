@@ -1,4 +1,4 @@
-"""The second reader: what the words of word addresses and SINUMERIK do."""
+"""The second reader: the effect of the words of word addresses and SINUMERIK."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ncfix.certificate.turning import SwivelCall, turned
 QUIET = frozenset((51, 80, 90, 150, 501, 600, 610, 611, 620, 640, 800, 911, 960, 970, 980, 990)) | frozenset(
     (4500, 4510, 6010, 6020, 6030, 6410, 6420, 6430, 6440, 6450)
 )
-"""G codes in tenths that move nothing and change no coordinates, or whose use is seen to elsewhere."""
+"""G codes, in tenths, that move nothing and change no coordinates, or are handled elsewhere."""
 CYCLES = re.compile("MCALL|CYCLE|HOLES|POCKET|SLOT|LONGHOLE")
 WORDS_QUIET = re.compile(
     r"MSG|SETMS|ORI(WKS|MKS|AXES|VECT|VIRT1)|SOFT|BRISK|DRIVE|FFWO(N|F)|COMP(OF|CAD|ON)|CFC|CFTCP|CFIN|"
@@ -34,16 +34,16 @@ WORDS_QUIET = re.compile(
 """Words of SINUMERIK that move nothing and change no coordinates."""
 DECLARES = frozenset(("DEF", "EXTERN"))
 OF_THE_CONTROL = 2000
-"""Numbers of variables from which on they may be offsets or positions."""
+"""Least number of a variable that may be an offset or a position of the control."""
 SINGLE = frozenset("GNFSTDMHPLEQO")
-"""Letters whose words are seen to, or mean nothing here."""
+"""Letters of words that are handled, or have no effect here."""
 
 
 class WordAddressFollower(AxisFollower):
     """Follows word addresses and SINUMERIK."""
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
-        """What one line does; None if it moves nothing."""
+        """The step of one line; None if it moves nothing."""
         if line.plain and line.path and not self.lost and self.modal_call is None and self._leads_straight(line):
             return self.straight(row, line)
         if self.family is Family.SINUMERIK:
@@ -71,7 +71,7 @@ class WordAddressFollower(AxisFollower):
         return self._motion(row, line, words) if line.path else None
 
     def _motion(self, row: int, line: TextLine, words: Mapping[str, TextWord]) -> AxisStep:
-        """A motion of the kind that is in force."""
+        """The step of a line with a path, by the kind of motion in force."""
         if not words and self.kind is not Kind.ARC:
             self.lost["odd"] = UNKNOWN_WORDS
             return self.step(row, Kind.FEED, dict(self.at), line, UNKNOWN_WORDS)
@@ -89,7 +89,7 @@ class WordAddressFollower(AxisFollower):
         return self._arc_of_words(step, line, start) if arc and not step.why else step
 
     def _call(self, row: int, line: TextLine, cycle: str) -> AxisStep | None:
-        """A line with a drilling cycle: a hole where the axes stand, or with MCALL behind each motion that follows."""
+        """A line with a drilling cycle: a hole where the axes stand, or, with MCALL, one behind each later motion."""
         names = [word.name for word in line.codes if word.name != "N"]
         call = HoleCall.of_arguments(cycle)
         if call is not None and names == ["MCALL", cycle] and not line.path:
@@ -102,7 +102,7 @@ class WordAddressFollower(AxisFollower):
         return None
 
     def _hole_after(self, row: int, line: TextLine, words: Mapping[str, TextWord], call: HoleCall) -> AxisStep:
-        """The modal cycle behind a motion."""
+        """The step of a motion that is followed by a modal drilling cycle."""
         if self.kind is Kind.ARC or len(line.path) > len(words):
             step = self.step(row, Kind.HOLE, dict(self.at), line, UNKNOWN_WORDS)
             step.foreign = True
@@ -110,21 +110,21 @@ class WordAddressFollower(AxisFollower):
         return self.called_hole(row, line, self.target({k: v for k, v in words.items() if k in self.at}), call)
 
     def _give(self, word: TextWord) -> None:
-        """A variable gets a value; with a high number it is one of the control."""
+        """Assign a value to a variable; one with a high number belongs to the control."""
         name = variable_name(word.name)
         self.variables[name] = value_of(word.number, self.variables)
         if name[1:].isdecimal() and int(name[1:]) >= OF_THE_CONTROL:
             self.lost["variable"] = "a variable of the control gets a value"
 
     def _smooths(self, line: TextLine, codes: Sequence[int]) -> bool:
-        """Whether a line does nothing but say how the control smooths the path, and for which axes (G5.1 Q2 X0 Y0)."""
+        """Whether a line only sets the smoothing of the path, and its axes (G5.1 Q2 X0 Y0)."""
         own = {word.name for word in line.codes}
         if self.family is not Family.WORDS or line.odd:
             return False
         return (codes == [51] and "Q" in own) or (codes in ([50], [1870]) and not line.path)
 
     def _changed_coordinates(self, line: TextLine, codes: Sequence[int]) -> bool:
-        """Take in a line that only shifts or turns the coordinates, by plain numbers; False if it does not."""
+        """Apply a line that only shifts or turns the coordinates, by plain numbers; False if it does not."""
         values = {word.name: word.value for word in line.path if word.value is not None and not word.counted}
         if len(values) < len(line.path) or self.lost or line.odd or self.beside:
             return False
@@ -134,7 +134,7 @@ class WordAddressFollower(AxisFollower):
         return self._shifted(line, codes, values) or self._turned(names, codes, values)
 
     def _shifted(self, line: TextLine, codes: Sequence[int], values: Mapping[str, float]) -> bool:
-        """Take in G52, G92 or G92.1 without other G or M codes; False if it is none."""
+        """Apply G52, G92 or G92.1 without other G or M codes; False for any other line."""
         if [word.name for word in line.codes if word.name not in "NTSF"] != ["G"]:
             return False
         if self.tcp or self.turn is not None or self.counting or not values.keys() <= self.at.keys():
@@ -157,7 +157,7 @@ class WordAddressFollower(AxisFollower):
         return True
 
     def _shifted_frame(self, names: Sequence[str], values: Mapping[str, float]) -> bool:
-        """TRANS in place of what the program has shifted and turned, but for a tilted plane; ATRANS on top of it."""
+        """Apply TRANS, which replaces all shifts and turns except a tilted plane, or ATRANS, which adds a shift."""
         tilted = self.turn is not None and self.turn.tilted
         if self.counting or (self.tcp and not tilted) or not values.keys() <= self.at.keys():
             return False
@@ -174,7 +174,7 @@ class WordAddressFollower(AxisFollower):
         return True
 
     def _turned(self, names: Sequence[str], codes: Sequence[int], values: Mapping[str, float]) -> bool:
-        """Take in G68 in its plane, G68.2 or G53.1 without other words; False if it is none."""
+        """Apply G68 in its plane, G68.2 or G53.1 without other words; False for any other line."""
         if names != ["G"] * len(codes):
             return False
         match sorted(codes):
@@ -195,7 +195,7 @@ class WordAddressFollower(AxisFollower):
         return True
 
     def _turned_frame(self, line: TextLine, names: Sequence[str], values: Mapping[str, float]) -> bool:
-        """Take in ROT, AROT or CYCLE800; False if it is none."""
+        """Apply ROT, AROT or CYCLE800; False for any other line, and for forms that this reader does not know."""
         angle = line.code("RPL")
         match sorted(names):
             case ["ROT" | "AROT" as name] if values.keys() <= {*"XYZ"}:
@@ -208,7 +208,7 @@ class WordAddressFollower(AxisFollower):
                 return False
 
     def _turn_on(self, name: str, turns: Sequence[tuple[str, float]]) -> bool:
-        """ROT in place of all that the program has shifted and turned, AROT on top of what it has shifted."""
+        """Apply ROT, which replaces all shifts and turns, or AROT, which adds a turn to shifts."""
         if self.tcp or (name == "AROT" and self.turn is not None):
             return False
         if name == "ROT":
@@ -219,7 +219,7 @@ class WordAddressFollower(AxisFollower):
         return True
 
     def _swivel(self, call: str) -> bool:
-        """CYCLE800: into a tilted plane, or out of it."""
+        """Apply CYCLE800: begin a tilted plane, or end it; False for forms that this reader does not know."""
         if self.turn is not None and not self.turn.tilted:
             return False
         if re.match(r'CYCLE800\([^,]*,[ \t]*"0"', call):
@@ -236,7 +236,7 @@ class WordAddressFollower(AxisFollower):
         return True
 
     def _leads_straight(self, line: TextLine) -> bool:
-        """Whether a line only brings axes straight to places; takes in its motion and feed if so."""
+        """Whether a line is only a straight motion; if so, its kind and feed are applied."""
         kind, feed = self.kind, self.feed
         for name, _, value, _ in line.codes:
             if name == "G" and (value == 0 or value == 1):
@@ -274,8 +274,8 @@ class WordAddressFollower(AxisFollower):
         return step.lead_round(self.axes, self.plane, centre, self.clockwise, size)
 
     def _modes(self, line: TextLine, codes: Sequence[int]) -> tuple[str, bool]:
-        """Take in the codes of a block: why it has no motion that this reader knows, and whether it is in machine
-        coordinates or to a reference point.
+        """Apply the codes of a block. Returns why its motion is unknown to this reader ("": it is known), and whether
+        it is in machine coordinates or to a reference point.
         """
         apart, fixed, length_set = "", False, False
         self._other_words(line)
@@ -300,7 +300,7 @@ class WordAddressFollower(AxisFollower):
         return apart, fixed or any(word.name == "SUPA" for word in line.codes)
 
     def _took_mode(self, code: int) -> bool:
-        """Take in a code of motion, plane, unit, distance, feed or cutter compensation; whether it is one."""
+        """Apply a code of motion, plane, unit, distance, feed or cutter compensation; False for any other code."""
         match code:
             case 0 | 10 | 20 | 30:
                 self.kind = (Kind.RAPID, Kind.FEED, Kind.ARC, Kind.ARC)[code // 10]
@@ -324,7 +324,7 @@ class WordAddressFollower(AxisFollower):
         return True
 
     def _took_system(self, code: int) -> bool:
-        """Take in a code of a work offset, or G49; whether it is one."""
+        """Apply a code of a work offset, G69 or G49; False for any other code."""
         match code:
             case 540 | 550 | 560 | 570 | 580 | 590 if self.family is Family.WORDS or code < 580:
                 self._system(f"G{code // 10}")
@@ -340,7 +340,7 @@ class WordAddressFollower(AxisFollower):
         return True
 
     def _took_cycle(self, code: int) -> bool:
-        """Take in a code of drilling cycles; whether it is one."""
+        """Apply a code of drilling cycles; False for any other code."""
         match code:
             case 730 | 740 | 810 | 820 | 830 | 840 | 850 | 860 | 870 | 880 | 890 if self.family is Family.WORDS:
                 if self.kind != Kind.HOLE:
@@ -356,7 +356,7 @@ class WordAddressFollower(AxisFollower):
         return True
 
     def _other_words(self, line: TextLine) -> None:
-        """Take in the words that are no G codes and lead no axis."""
+        """Apply the words that are neither G codes nor words of axes."""
         if any(word.name in DECLARES for word in line.codes):
             return
         for word in line.codes:
@@ -391,7 +391,7 @@ class WordAddressFollower(AxisFollower):
                     self.lost[name] = f"{name} is not known to this reader"
 
     def _modal_call(self, alone: bool) -> None:
-        """MCALL: alone it ends the modal call, and with that what was not followed because of it."""
+        """MCALL: alone it ends the modal call, also one that this reader could not follow."""
         if alone:
             left = {key: why for key, why in self.lost.items() if not CYCLES.match(key)}
             if len(left) < len(self.lost):
@@ -401,7 +401,7 @@ class WordAddressFollower(AxisFollower):
             self.lost["MCALL"], self.modal_call = "a modal call", None
 
     def _sinumerik_word(self, word: TextWord) -> None:
-        """A variable that gets a value, or a word that does something."""
+        """Apply an assignment to a variable, or a word of SINUMERIK."""
         known = self.variables
         known[word.name] = value_of(word.number, known) if word.value is None and word.number else word.value
         name = word.name.partition("(")[0].strip()
@@ -445,7 +445,7 @@ class WordAddressFollower(AxisFollower):
         return step
 
     def _hole(self, row: int, line: TextLine, words: Mapping[str, TextWord]) -> AxisStep:
-        """A drilling cycle at a place: in G17, with absolute words."""
+        """The step of a hole by a drilling cycle of word addresses: in G17, with absolute words."""
         if self.counting or self.plane != 17 or line.code("K") or line.code("L") or line.word("I") or line.word("K"):
             step = self.step(row, Kind.HOLE, dict(self.at), line, "a drilling cycle that this reader does not know")
             step.foreign = True  # one that is repeated may be written out
@@ -474,6 +474,6 @@ class WordAddressFollower(AxisFollower):
 
 
 def follower_of(family: Family, axes: Sequence[str], given: Given, model: TipModel | None) -> AxisFollower:
-    """What follows programs of a family."""
+    """The follower for programs of a family."""
     kind = KlartextFollower if family is Family.KLARTEXT else WordAddressFollower
     return kind(axes, family, given, model)

@@ -1,6 +1,6 @@
-"""What the second reader finds: how many blocks are proved, which are not and why, which are faulty.
+"""The findings of the proof: the number of proved blocks, those not proved and why, and the faulty ones.
 
-Lines are counted from one, those of the corrected program and those of the original.
+Lines are counted from 1, in the corrected program and in the original.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ncfix.values import mutable
 
 
 class BlockFault(NamedTuple):
-    """What is wrong, with the line of the corrected program, and of the original (0: of none)."""
+    """A fault, with its line in the corrected program, and in the original (0: none)."""
 
     text: str
     line: int
@@ -25,11 +25,12 @@ class BlockFault(NamedTuple):
 
 @mutable
 class BlockProof:
-    """What was found.
+    """The result of a proof.
 
-    blocks   lines of the original that are not empty; `motions` of them move something
-    proved, unproved   how many of each; the rest is faulty
-    left     why blocks are not proved, by their lines
+    blocks   number of lines of the original that are not empty; `motions`: those of them that move axes
+    proved   number of proved blocks; `proved_motions`: those of them that move axes
+    left     line of a block that is not proved -> the reason
+    faulty   lines of faulty blocks
     """
 
     blocks: int = 0
@@ -40,19 +41,19 @@ class BlockProof:
     faults: list[BlockFault] = field(default_factory=list)
     faulty: set[int] = field(default_factory=set)
     largest_um: float = 0.0
-    """The largest change of a command of X, Y or Z that was looked at."""
+    """The largest correction of a command of X, Y or Z, um."""
     farthest_um: float = 0.0
-    """The farthest that the tip was found from the intended way, on the way of proved motions."""
+    """The largest distance of the tip from the intended way along proved motions, um."""
     stamp: StampFound | None = None
 
     @property
     def unproved(self) -> int:
-        """Blocks that are neither proved nor faulty."""
+        """Number of blocks that are neither proved nor faulty."""
         return len(self.left)
 
     @property
     def reasons(self) -> Counter[str]:
-        """How many blocks are not proved, by the reason."""
+        """Reason -> number of blocks that are not proved for it."""
         return Counter(self.left.values())
 
     def lines(self, why: str, most: int = 5) -> list[int]:
@@ -60,19 +61,19 @@ class BlockProof:
         return list(islice((line for line, reason in self.left.items() if reason == why), most))
 
     def fault(self, text: str, line: int, original: int) -> None:
-        """Something is wrong."""
+        """Add a fault; `original` 0: it belongs to no line of the original."""
         self.faults.append(BlockFault(text, line, original))
         if original:
             self.faulty.add(original)
 
     def leave(self, why: str, line: int) -> None:
-        """A block is not proved."""
+        """Note that the block in a line of the original is not proved, and why."""
         self.left.setdefault(line, why)
 
     def join(self, other: BlockProof, moving: Set[int]) -> None:
-        """Take in what was found of the same programs in another position of block delete.
+        """Join the result for the same programs in another position of block delete.
 
-        moving  the lines of the original that move something
+        moving  lines of the original that move axes
         """
         worse = (other.left.keys() | other.faulty) - self.left.keys() - self.faulty
         self.proved -= len(worse)

@@ -1,7 +1,7 @@
-"""The second reader: where the axes go, block by block, in plain programs of three families.
+"""The second reader: the motion of the axes, block by block, in plain programs of three families.
 
-It follows straight motions, arcs, drilling cycles, work offsets, tool lengths and tool-centre-point control. Whatever
-else a program uses, it says so and follows no further: `AxisStep.why` has the reason. It never guesses.
+It follows straight motions, arcs, drilling cycles, work offsets, tool lengths and tool-centre-point control. If a
+program uses anything else, it gives the reason in `AxisStep.why` and follows no further. It never guesses.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ CENTRES = {"X": "I", "Y": "J", "Z": "K"}
 
 @frozen
 class Given:
-    """What a program cannot know: offsets, tool lengths, start and reference points by axis letter, mm and degree.
+    """Values outside the program: offsets, tool lengths, start and reference points by axis letter, mm and degree.
 
-    tools  by number, or by name in upper case
-    skip   which switches of block delete are on, or all or none; None: `prove` looks at every position
+    tools  tool lengths by number, or by name in upper case
+    skip   the switches of block delete that are on, or True: all, False: none; None: `prove` examines every position
     """
 
     offsets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -45,21 +45,21 @@ class Given:
     skip: bool | frozenset[int] | None = None
     workpiece_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     inputs: Mapping[str, float] = field(default_factory=dict)
-    """What the errors of the machine depend on besides its axes."""
+    """Inputs of the error model, by name."""
     pointless: bool = False
-    """Numbers without a decimal point count increments: such programs are not followed."""
+    """Numbers without a decimal point count least increments: such programs are not followed."""
     decimal_inches: bool = False
-    """A least increment of 0.001 mm is one of 0.0001 inch in blocks in inches."""
+    """A least increment of 0.001 mm becomes 0.0001 inch in blocks in inches."""
 
 
 def skips(switches: bool | frozenset[int] | None, line: TextLine) -> bool:
-    """Whether a line is skipped where these switches of block delete are on, or all or none; None is none."""
+    """Whether a line is skipped if these switches of block delete are on; True: all are, False or None: none is."""
     on = line.skipped in switches if isinstance(switches, frozenset) else bool(switches)
     return bool(line.skipped) and on and not line.odd
 
 
 def positions(text: Text, given: Given) -> list[Given]:
-    """What is given in each position of the switches of block delete that a program asks, all of them off first."""
+    """The given values for each position of the program's switches of block delete, first with all of them off."""
     asked = sorted({line.skipped for _, line in text.apart()} - {0}) if given.skip is None else []
     if not asked or len(asked) > MOST_SWITCHES:
         return [given]
@@ -68,24 +68,24 @@ def positions(text: Text, given: Given) -> list[Given]:
 
 
 MOST_SWITCHES = 4
-"""Of block delete, as many as `fix` looks at."""
+"""Largest number of switches of block delete whose positions are all examined, as by `fix`."""
 LEAST = 6
-"""So many straight lines one behind the other are followed in columns."""
+"""Least number of consecutive straight lines that are followed in columns."""
 REWRITTEN = re.compile(r"jumps|odd|end|MCALL|CYCLE|CYCL|HOLES|POCKET|SLOT|LONGHOLE|G11[012]|G16|CT|CIP|RND|CHF|AP|RP")
-"""What a program uses, and is not followed behind; a correction may write further lines another way."""
+"""Reasons for which a program is not followed any further, and behind which a correction may rewrite lines."""
 UNKNOWN_WORDS = "words that this reader does not know here"
 ROUND = 179.0
-"""Degrees from which on the shorter way may be the other one: half a turn, less what a correction may be."""
+"""Turn, degrees, above which the shorter way may be the other one: half a turn minus a correction."""
 SQUARE = 2e-4
-"""rad; rotary words have three decimals of a degree."""
+"""Largest angle, rad, of a tool that is square to a plane: rotary words have three decimals of a degree."""
 NO_POLE, NO_CENTRE = "the pole is not known", "an arc without a centre"
 
 
 class AxisFollower:
-    """A control that knows a few codes. One for each program; `run` gives its steps.
+    """A simple model of a control, one for each program; `run` returns the steps of the program.
 
-    shortest   M126: rotary axes go the shorter way, which is another one from half a turn on
-    by_vector  under tool-centre-point control the tool turns in a plane, not its axes at even rates
+    shortest   M126: rotary axes go the shorter way, which is ambiguous at half a turn
+    by_vector  under tool-centre-point control the tool turns in a plane, instead of the axes evenly
     ended      the program has ended
     """
 
@@ -107,36 +107,36 @@ class AxisFollower:
         self.length: float | None = 0.0 if family is Family.WORDS else self.length_of(self.tool)
         """The tool length in force in coordinates; SINUMERIK and Klartext begin with that of the tool in place."""
         self.between = False
-        """The length offset in force is not of the tool in the spindle: which of them counts is not sure."""
+        """The length offset in force is not that of the tool in the spindle, so the length of the tool is not sure."""
         self.tcp = self.asks_tip = given.tcp
         self.turn: TurnedFrame | None = None
-        """Where the coordinates are turned; `at` holds numbers then, not commands."""
+        """The turned coordinates in force; then `at` holds numbers of the program, not commands."""
         self.beside = False
         self.feed: float | None = None
         self.feed_mode = 94
         self.cycle: dict[str, float] = {}
         self.returns_to_level: bool | None = None
         self.before_cycle, self.said_before = NAN, False
-        """Where Z stood before the cycles, and whether the program has brought it there."""
+        """Position of Z before the cycles, and whether the program has set it."""
         self.calls: dict[int, HoleCall] = {}
-        """The drilling cycles of holes, by their lines."""
+        """Line -> the drilling cycle of its hole."""
         self.modal_call: HoleCall | None = None
-        """MCALL: the cycle that follows each motion."""
+        """The cycle of MCALL, which follows each motion."""
         self.pole: dict[str, float] = {}
         self.shifts: dict[str, float] = {}
-        """What the program itself adds to the numbers of axes, mm or degree: G92, TRANS."""
+        """Shifts of axes by the program (G92, TRANS), mm or degree."""
         self.local: dict[str, float] = {}
-        """The same by G52."""
+        """Shifts of axes by G52, mm or degree."""
         self.variables: dict[str, float | None] = {}
-        """What the program has given variables and parameters; None: not known."""
+        """Values of variables and parameters; None: not known."""
         self.lost: dict[str, str] = {}
         self.foreign: set[int] = set()
-        """Lines that a correction may rewrite otherwise."""
+        """Lines that a correction may rewrite in a form unknown to this reader."""
         if given.pointless:
             self.lost["points"] = "numbers without a decimal point count increments"
 
     def run(self, text: Text) -> ProgramSteps:
-        """Follow the lines of a program."""
+        """The steps of a program."""
         lines = text.lines
         if any(line.odd is JUMPS for _, line in text.apart()):
             self.lost["jumps"] = JUMPS
@@ -157,8 +157,8 @@ class AxisFollower:
         return log.done()
 
     def _line(self, row: int, line: TextLine, log: ProgramSteps) -> None:
-        """Follow one line."""
-        behind = self.ended and not (line.path or line.codes)  # the % that is last stays where it is
+        """Follow one line, and log its step."""
+        behind = self.ended and not (line.path or line.codes)  # the last % stays
         if line.odd or (self.lost and not behind and any(map(REWRITTEN.match, self.lost))):
             self.foreign.add(row)
         if line.skipped and self.given.skip is None:
@@ -178,7 +178,7 @@ class AxisFollower:
                 self.forget()
 
     def straight_run(self, lines: StraightLines, row: int, stop: int) -> StraightRun | None:
-        """The steps of lines that only bring axes straight to places; None if that takes more than columns."""
+        """The steps of consecutive straight motions; None if they cannot be followed in columns."""
         klartext = self.family is Family.KLARTEXT
         if not klartext and (self.kind is None or self.kind > Kind.FEED) and lines.code[row] < 0:
             return None
@@ -213,29 +213,29 @@ class AxisFollower:
         return run
 
     def _goes_round(self, places: Array) -> bool:
-        """Whether a rotary axis goes half a turn or more from one of places (n, n_axes) to the next."""
+        """Whether a rotary axis turns by about half a turn or more from one of places (n, n_axes) to the next."""
         turns = [column for column, axis in enumerate(self.axes) if axis in "ABC"]
         return bool((np.abs(np.diff(places[:, turns], axis=0)) >= ROUND).any())
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
-        """What one line does; None if it moves nothing."""
+        """The step of one line; None if it moves nothing."""
         raise NotImplementedError
 
-    # -- what all families share --------------------------------------------------------------------------------------
+    # -- common to all families ---------------------------------------------------------------------------------------
 
     def forget(self) -> None:
-        """Nothing is known of where axes stand."""
+        """Mark the positions of all axes as not known."""
         for axis in self.axes:
             self.at[axis], self.said[axis] = NAN, False
 
     def unsay(self, axes: str | tuple[str, ...] = ()) -> None:
-        """The program has not brought these axes, or all, to where they stand."""
+        """Mark the positions of these axes, or of all, as not set by the program."""
         for axis in axes or self.axes:
             if axis in self.said:
                 self.said[axis] = False
 
     def offset(self, axis: str) -> float:
-        """What is added to the numbers of an axis, mm or degree."""
+        """The sum of all offsets that are added to the numbers of an axis, mm or degree; NaN if not known."""
         system = self.given.offsets.get(self.system)
         if system is None:
             shift = 0.0 if self.given.assume_zero or self.system == "G500" else NAN
@@ -248,19 +248,19 @@ class AxisFollower:
         return shift
 
     def length_of(self, tool: int | str) -> float | None:
-        """The length of a tool, mm, if it is given."""
+        """The length of a tool, mm; None if it is not given."""
         found = self.given.tools.get(tool)
         return 0.0 if found is None and self.given.assume_zero else found
 
     def tip_length(self) -> float:
-        """How long the tool is whose tip is looked at, mm; NaN if that is not known."""
+        """The length of the tool in the spindle, mm; NaN if not known."""
         length = None if self.between else self.length_of(self.tool)
         return NAN if length is None else length
 
     def lead(self, on: bool) -> None:
-        """Tool-centre-point control goes on or off: the same place has other numbers.
+        """Switch tool-centre-point control on or off, and convert the position to the new coordinates.
 
-        Where the setup says that X Y Z are those of the tip, only Klartext can say that they are not.
+        If the setup says that X Y Z are those of the tip, only Klartext can switch it off.
         """
         self.asks_tip = on
         on = on or (self.turn is not None and self.turn.tilted)
@@ -277,9 +277,9 @@ class AxisFollower:
         self.unsay("XYZ")
 
     def begin_turn(self, rotation: Array, origin: Sequence[float] = (0.0, 0.0, 0.0), *, tilted: bool) -> None:
-        """Coordinates are turned about the zero point, and moved to an origin (3,), mm from there.
+        """Turn the coordinates about the zero point, and move it by `origin` (3,), mm.
 
-        tilted  in a plane of the workpiece: then X Y Z are those of the tip
+        tilted  they are fixed to the workpiece, so that X Y Z are those of the tip
         """
         self.end_turn()
         if self.model is None or (tilted and not self.model.leads):
@@ -293,7 +293,7 @@ class AxisFollower:
         self._enter(TurnedFrame(self.model.columns, rotation, zero, zero + np.array(origin), tilted))
 
     def begin_turn_about(self, rotation: Array, centre: Mapping[str, float]) -> None:
-        """Coordinates are turned, and the numbers of some axes stay as they are at a centre, mm."""
+        """Turn the coordinates about a centre, mm, whose numbers stay the same."""
         self.end_turn()
         middle = np.array([centre.get(axis, 0.0) for axis in "XYZ"])
         if self.model is None or self.tcp:
@@ -302,7 +302,7 @@ class AxisFollower:
             self._enter(TurnedFrame(self.model.columns, rotation, middle, middle, False))
 
     def end_turn(self) -> None:
-        """Coordinates are not turned any more."""
+        """End the turn of the coordinates."""
         before, self.turn = self.turn, None
         if before is not None:
             self._stand_at(before.commands(np.array([[*self.at.values()]]))[0], before)
@@ -313,14 +313,14 @@ class AxisFollower:
         self._stand_at(turn.numbers(np.array([*self.at.values()])), turn)
 
     def _stand_at(self, place: Array, turn: TurnedFrame) -> None:
-        """The same place has these numbers (n_axes,) now; those that a turn changes the program has not said."""
+        """Set the position (n_axes,) in new coordinates; numbers that change count as not set by the program."""
         for k, axis in enumerate("XYZ"):
             number = float(place[turn.columns[k]])
             if number != self.at[axis]:
                 self.at[axis], self.said[axis] = number, False
 
     def forget_place(self, but: str = "") -> None:
-        """Where X, Y and Z stand, but for some of them, is not known until the program says it."""
+        """Mark the positions of X, Y and Z, except those in `but`, as not known."""
         for axis in "XYZ":
             if axis not in but:
                 self.at[axis], self.said[axis] = NAN, False
@@ -333,13 +333,13 @@ class AxisFollower:
         return bool(np.abs(way.directions(here[None])[0] - self.turn.rotation[:, 2]).max() < SQUARE)
 
     def _turns(self) -> Array:
-        """Where the rotary axes stand, rad."""
+        """Positions of the rotary axes, rad."""
         return np.radians([self.at[axis] for axis in self.axes if axis in "ABC"])
 
     def square_to(
         self, rotation: Array, *, sense: int = 0, sign: int = 0, inside: bool = False, stays: bool = True
     ) -> dict[str, float]:
-        """Where the rotary axes go to square the tool to a plane, degrees, as `RotaryWay.to`; NaN if not known."""
+        """Rotary positions, degrees, with the tool square to a plane, see `RotaryWay.to`; NaN if not known."""
         turning = [axis for axis in self.axes if axis in "ABC"]
         way, here = None if self.model is None else self.model.rotary_way, self._turns()
         if way is None or not np.isfinite(here).all():
@@ -348,10 +348,10 @@ class AxisFollower:
         return dict(zip(turning, [NAN, NAN] if found is None else np.degrees(found).tolist(), strict=True))
 
     def settled(self, line: TextLine) -> TextLine:
-        """A line whose words have the values of their formulas, where the variables in them are known."""
+        """The line with formulas replaced by their values, if the variables in them are known."""
         if line.plain or all(word.value is not None for word in line.path):
             return line
-        given_here = {word.name for word in line.codes}  # which of both values counts is not sure
+        given_here = {word.name for word in line.codes}  # whether the old or the new value counts is not sure
         known = {name: value for name, value in self.variables.items() if name not in given_here}
         values = (word.value if word.value is not None else value_of(word.number, known) for word in line.path)
         path = [
@@ -361,11 +361,11 @@ class AxisFollower:
         return replace(line, path=path)
 
     def scale(self, axis: str) -> float:
-        """Mm, or degree, in a unit of the words of an axis."""
+        """The unit of the words of an axis, mm or degree."""
         return self.unit if axis in "XYZUVW" else 1.0
 
     def target(self, words: Mapping[str, TextWord], machine: bool = False) -> dict[str, float]:
-        """Where the words lead, and which axes they say."""
+        """The positions to which words lead, `machine`: in machine coordinates; marks axes that the program sets."""
         end = dict(self.at)
         for axis, word in words.items():
             value = NAN if word.value is None else word.value * self.scale(axis)
@@ -380,7 +380,7 @@ class AxisFollower:
         return end
 
     def step(self, row: int, kind: Kind, end: dict[str, float], line: TextLine, why: str = "") -> AxisStep:
-        """What a line does, which ends at `end`, and why it cannot be followed, if so."""
+        """The step of a line that ends at `end`; `why`: the reason why it cannot be followed, if there is one."""
         named = {word.name: word for word in line.path if word.name in self.at}
         strange = next((word.name for word in line.path if word.name in AXES and word.name not in self.at), "")
         if not why and strange:
@@ -417,7 +417,7 @@ class AxisFollower:
         return step
 
     def straight(self, row: int, line: TextLine) -> AxisStep:
-        """The step of a line that only brings axes straight to places, as `step` gives it: nothing else is in force."""
+        """The step of a straight motion, as `step` returns it, but faster: no other state is in force."""
         at, said, counting = self.at, self.said, self.counting
         start = list(at.values())
         named = {}
@@ -459,7 +459,7 @@ class AxisFollower:
         return step
 
     def auxiliary(self, word: TextWord) -> None:
-        """An M word."""
+        """Apply an M word."""
         match word.value:
             case 6:
                 self.between = self.family is Family.WORDS and bool(self.length) and self.next_tool != self.tool
@@ -477,11 +477,11 @@ class AxisFollower:
                 pass
 
     def choose_edge(self, number: float | None) -> None:
-        """D of SINUMERIK: its length is in force, and none of T0 or D0."""
+        """D of SINUMERIK: puts the length of the tool in force; with T0 or D0, none."""
         self.new_length(self.length_of(self.tool) if number and self.tool else 0.0)
 
     def new_length(self, length: float | None) -> None:
-        """Another tool length is in force in coordinates; it lies along Z of the machine, however they are turned."""
+        """Put a tool length in force in coordinates; it lies along Z of the machine, however they are turned."""
         before, self.length, self.between = self.length, length, False
         if self.turn is not None and not self.tcp and self.turn.rotation[2, 2] != 1.0:
             place = self.turn.commands(np.array([[*self.at.values()]]))[0]
@@ -492,7 +492,7 @@ class AxisFollower:
 
 
 def _stops(flags: Mask) -> list[int]:
-    """Where the run of true ones ends in which each of them stands; of others their own index."""
+    """For each true flag, the end of the run of true flags in which it stands; for others, their own index."""
     n = len(flags)
     others = np.where(flags, n, np.arange(n))
     found: list[int] = np.minimum.accumulate(others[::-1])[::-1].tolist()

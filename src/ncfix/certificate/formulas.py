@@ -1,7 +1,8 @@
-"""The second reader: formulas of plain numbers, and of variables to which the program has given plain values.
+"""The second reader: formulas of plain numbers, and of variables with plain values.
 
-It knows what all controls work out alike: brackets, + - * /, powers, roots, and SIN, COS and TAN of degrees. Where
-controls differ (rounding, whole numbers, arc tangents, comparisons, the sign of a power) a formula has no value here.
+It evaluates the operations that are equal on all controls: brackets, + - * /, powers, roots, and SIN, COS and TAN of
+degrees. A formula in which controls differ (rounding, integers, arc tangents, comparisons, the sign of a power) has no
+value here.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import re
 from collections.abc import Callable, Mapping
 
 LONGEST = 400
-"""Characters of a formula that is looked at."""
+"""Largest number of characters of a formula."""
 TOKEN = re.compile(
     r"[ \t]*(?:(\d+\.?\d*|\.\d+)|(#\d+|#<[^<>]*>|[A-Z_]\w*)|(\*\*|[-+*/^()\[\]]))[ \t]*", re.ASCII | re.IGNORECASE
 )
@@ -29,9 +30,9 @@ FUNCTIONS: Mapping[str, Callable[[float], float]] = {
 
 
 def value_of(formula: str, known: Mapping[str, float | None]) -> float | None:
-    """What a formula is worth; None if that is not known.
+    """The value of a formula; None if it is not known.
 
-    known  values of variables by `variable_name`, None for those that are not known
+    known  name of a variable, see `variable_name` -> its value; None: not known
     """
     tokens, at = list[str](), 0
     while at < len(formula) <= LONGEST and (found := TOKEN.match(formula, at)):
@@ -47,7 +48,7 @@ def value_of(formula: str, known: Mapping[str, float | None]) -> float | None:
 
 
 def variable_name(text: str) -> str:
-    """A variable as it is looked up, however it is written."""
+    """The name of a variable without blanks, in upper case."""
     return re.sub(r"[ \t]", "", text).upper()
 
 
@@ -79,7 +80,7 @@ def _power(tokens: list[str], at: int, known: Mapping[str, float | None]) -> tup
 
 
 def _single(tokens: list[str], at: int, known: Mapping[str, float | None]) -> tuple[float, int]:
-    """A number, a variable, a bracket, or a function of one of these."""
+    """The value of a number, variable, bracket, or function of one of these, and the index of the next token."""
     token = tokens[at].upper()
     if token in CLOSES:
         value, behind = _sum(tokens, at + 1, known)

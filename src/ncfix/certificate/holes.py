@@ -1,8 +1,8 @@
-"""The second reader: drilling cycles of SINUMERIK and Klartext, and the lines in which a correction puts one hole.
+"""The second reader: drilling cycles of SINUMERIK and Klartext, and the lines in which a correction writes one hole.
 
-Both say in a call how deep a hole is. A correction leads the tool over the place by words of axes, and gives a hole
-that needs another depth a call of its own (MCALL before and behind it), or moves the surface from which the cycle
-counts (FN 1 and FN 2 on Q203).
+In both languages the call of a cycle gives the depth. A correction moves the tool over the place by words of axes. For
+another depth it gives a hole a call of its own (MCALL before and behind it), or moves the surface to which the depth
+refers (FN 1 and FN 2 on Q203).
 Source: Siemens, "SINUMERIK, cycles"; Heidenhain TNC 640, "Cycle programming".
 """
 
@@ -17,35 +17,35 @@ from ncfix.certificate.reading import CYCLE_CALL, DECIMAL, Family, TextLine
 from ncfix.certificate.steps import NAN
 
 RTP, RFP, DP, DPR = 0, 1, 3, 4
-"""Arguments of all drilling cycles of SINUMERIK: where the tool ends, the reference plane, and the two ways to say how
-deep the hole is."""
+"""Places of common arguments of all drilling cycles of SINUMERIK: retraction plane, reference plane, final depth
+absolute, and final depth relative to the reference plane."""
 KNOWN = {81: 6, 82: 6, 83: 12, 84: 12, 85: 8, 86: 11, 87: 6, 88: 7, 89: 6, 840: 11}
-"""How many arguments change neither the axis of the hole nor what its depth means."""
+"""Number of arguments that change neither the axis of the hole nor the meaning of its depth."""
 FIRST_DEPTH = {83: {5: 1, 6: -1}}
-"""Where a cycle says how deep it goes first, as a place, which rises with the bottom, and as a way, which falls."""
+"""Places of the first drilling depth: absolute, which rises with the bottom (1), and relative, which falls (-1)."""
 ADDED = re.compile(rf"FN ?([12]): ?(Q203) ?= ?\+?\2 ?([+-]) ?({DECIMAL})", re.IGNORECASE)
 ASSIGNED = re.compile(rf"(?<!\w)(Q\d+) ?= ?(?:({DECIMAL})(?=[ \t]*(?:~|$|Q\d+ ?=)))?", re.IGNORECASE)
-"""A Q parameter that gets a value, and that value if it is a plain number."""
+"""An assignment to a Q parameter, with its value if that is a plain number."""
 FORMULA = re.compile(r"(?:FN ?[0-7] ?: ?)?(Q[LR]?\d+) ?= ?([^=]+)", re.IGNORECASE)
-"""A Q parameter that gets the value of a formula."""
+"""An assignment of a formula to a Q parameter."""
 BUSY = re.compile(r"Q1\d\d")
-"""Q parameters to which the control itself gives values."""
+"""Q parameters that are set by the control itself."""
 CALLS = {
     Family.SINUMERIK: re.compile(rf"[ \t]*(?:\bMCALL\b(?:[ \t]*{CYCLE_CALL})?|{CYCLE_CALL})", re.IGNORECASE),
     Family.KLARTEXT: re.compile(rf"[ \t]*(?:CYCL CALL(?![ \t]*\w)|{ADDED.pattern}(?=[ \t]*$)|\bM99\b)", re.IGNORECASE),
 }
-"""What calls a hole, or gives it another depth."""
+"""Text that calls a drilling cycle, or changes the depth of a hole."""
 NOTHING = re.compile(r"[ \t]*/?\d?[ \t]*(?:N[ \t]*\d+)?[ \t]*(?:;.*)?", re.IGNORECASE)
-"""What a line has besides that does nothing."""
+"""Further text of a line without effect: block delete, number, comment."""
 
 
 class HoleCall(NamedTuple):
     """A drilling cycle with plain numbers, in units of the program.
 
-    values  arguments, or Q200, Q201, Q203 and Q204; of word addresses R
-    depths  which of them a correction changes, and whether they rise (1) or fall (-1) with the bottom
-    bottom  where the hole ends; NaN: not known
-    level   where the tool stands after it
+    values  arguments; in Klartext Q200, Q201, Q203 and Q204; in word addresses R
+    depths  place in `values` of a depth that a correction changes -> whether it rises (1) or falls (-1) with the bottom
+    bottom  bottom of the hole; NaN: not known
+    level   level of the tool after the cycle
     """
 
     name: str
@@ -75,7 +75,7 @@ class HoleCall(NamedTuple):
 
     @classmethod
     def of_parameters(cls, number: int, parameters: Mapping[str, float | None]) -> HoleCall:
-        """Cycle 200 and its like of Klartext, as its parameters stand."""
+        """The call of cycle 200 or a similar cycle of Klartext, with the present values of its parameters."""
         values = tuple(parameters.get(name) for name in ("Q200", "Q201", "Q203", "Q204"))
         gap, deep, surface, second = (NAN if value is None else value for value in values)
         if not deep or (number == 240 and parameters.get("Q343", 0.0) != 0.0):
@@ -83,7 +83,7 @@ class HoleCall(NamedTuple):
         return cls(str(number), values, {2: 1}, surface + deep, surface + max(gap, second))
 
     def differs_in_depth_only(self, other: HoleCall, digit: float) -> bool:
-        """Whether another call makes the same hole up to its depth: what changes follows that to a digit."""
+        """Whether another call makes the same hole at another depth: all changed values follow it within `digit`."""
         if self.name != other.name or len(self.values) != len(other.values):
             return False
         risen = other.bottom - self.bottom
@@ -97,7 +97,7 @@ class HoleCall(NamedTuple):
 
 
 def assign(text: str, parameters: dict[str, float | None]) -> None:
-    """Take in what a line of Klartext says of Q parameters; of those whose value is not known it takes in that."""
+    """Apply the assignments to Q parameters in a line of Klartext; a value that is not known becomes None."""
     code = text.partition(";")[0].strip(" \t~")
     if found := ADDED.match(code):
         before, change = parameters.get("Q203"), float(found[4].replace(",", "."))
@@ -115,12 +115,12 @@ def assign(text: str, parameters: dict[str, float | None]) -> None:
 
 
 def hole_text(family: Family, lines: Sequence[TextLine]) -> list[str]:
-    """What the lines of a hole say besides the call of the cycle, word by word."""
+    """The words of the lines of a hole, without the call of the cycle."""
     return " ".join(CALLS[family].sub("", line.rest) for line in lines).split()
 
 
 def puts_back(call: HoleCall, lines: Sequence[TextLine]) -> bool:
-    """Whether the lines that stand for a hole leave the cycle as it was: Q203 for one, or a modal call."""
+    """Whether the lines of a hole leave the state of the cycle unchanged: Q203, or a modal call."""
     changes = (found for line in lines if not line.path and (found := ADDED.search(line.rest)))
     risen = sum(float(found[4].replace(",", ".")) * (1 if found[1] == "1" else -1) for found in changes)
     later = (found for line in lines[1:] if (found := re.search(CYCLE_CALL, line.rest.upper())))
@@ -128,7 +128,7 @@ def puts_back(call: HoleCall, lines: Sequence[TextLine]) -> bool:
 
 
 def calls_only(family: Family, line: TextLine) -> bool:
-    """Whether a line does nothing but call a hole, or give it another depth."""
+    """Whether a line only calls a drilling cycle, or changes the depth of a hole."""
     if line.path or family not in CALLS:
         return False
     left = CALLS[family].sub("", line.rest, 1)

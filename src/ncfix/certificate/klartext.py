@@ -1,4 +1,4 @@
-"""The second reader: what the blocks of Klartext do."""
+"""The second reader: the effect of the blocks of Klartext."""
 
 from __future__ import annotations
 
@@ -16,32 +16,32 @@ from ncfix.certificate.text import Text
 from ncfix.certificate.turning import PlaneBlock, about
 
 HOLES = re.compile(r"CYCL DEF (20[0-35-79]|24[01])\b")
-"""Cycles for holes whose bottom is Q203 + Q201."""
+"""Drilling cycles whose bottom is Q203 + Q201."""
 FRAMES = re.compile(r"CYCL DEF (?:7|8|9|10|11|13|19|26)\b|PLANE|TRANS|FUNCTION")
-"""Lines of Klartext that this reader does not follow, behind which blocks keep their form."""
+"""Lines that this reader does not follow, but behind which a correction keeps the form of blocks."""
 
 
 TRANSFORMS = re.compile(r"CYCL DEF (7|10)\.[1-9][ \t]*(.*)")
 TRANSFORM_WORD = re.compile(r"(I?(?:[XYZ]|ROT))[ \t]*([+-]?[\d.,]+)")
 DATUM = re.compile(r"Q339 ?= ?\+?(\d+)[ \t]*(?:[;~]|$)")
-"""Which datum CYCL DEF 247 sets."""
+"""The datum number of CYCL DEF 247."""
 TOOL = re.compile(r'TOOL CALL (?:(\d+)|"([^"]*)")')
 SPEED = re.compile(r"TOOL CALL (?:Z )?[SF][\d ]")
-"""TOOL CALL without a tool: another speed or feed."""
+"""TOOL CALL without a tool, for another speed or feed."""
 OVERSIZE = re.compile(r"\bDL ?(?:([+-]?[\d.,]+)|[+-]?Q)")
-"""What TOOL CALL adds to the length of the tool."""
+"""The oversize of the tool length in TOOL CALL."""
 
 
 GOES_ON = re.compile(rb"~[ \t]*\n(?![ \t]*Q)", re.IGNORECASE)
-"""A block that goes on in a line which is no parameter of a cycle."""
+"""A block that continues in a line that is no parameter of a cycle."""
 
 
 class KlartextFollower(AxisFollower):
     """Follows Klartext.
 
-    datum     CYCL DEF 247 has begun, and its number is still to come
-    drilling  which cycle for holes is defined
-    oversize  mm, what the last tool call adds to the length of the tool (DL)
+    datum     CYCL DEF 247 has begun, and its datum number is still to come
+    drilling  number of the drilling cycle that is defined; 0: none
+    oversize  oversize of the tool length (DL) in the last tool call, mm
     """
 
     datum = False
@@ -49,13 +49,13 @@ class KlartextFollower(AxisFollower):
     oversize = 0.0
 
     def run(self, text: Text) -> ProgramSteps:
-        """Follow the lines of a program."""
+        """The steps of a program."""
         if GOES_ON.search(text.source):
             self.lost["odd"] = "a block goes on in the next line (~)"
         return super().run(text)
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
-        """What one line does; None if it moves nothing."""
+        """The step of one line; None if it moves nothing."""
         if line.plain and line.path and not self.lost and not self.shortest and self._leads_straight(line):
             return self.straight(row, line)
         lead = line.codes[0].name if line.codes else ""
@@ -79,7 +79,7 @@ class KlartextFollower(AxisFollower):
         return self._path(row, line, lead, words)
 
     def _odd(self, row: int, line: TextLine, lead: str) -> AxisStep | None:
-        """A line that cannot be taken apart; behind M140 an axis is followed again once it has its place."""
+        """The step of a line that cannot be parsed; behind M140, an axis is followed again once it gets a position."""
         if line.odd is not RETRACTS and line.rest.strip():
             self.lost["frame" if FRAMES.match(lead) else "odd"] = line.odd
         if line.odd is not RETRACTS and not line.path:
@@ -89,7 +89,7 @@ class KlartextFollower(AxisFollower):
     def _fixed(
         self, row: int, line: TextLine, words: Mapping[str, TextWord], zero: Mapping[str, float] | None
     ) -> AxisStep:
-        """A motion in machine coordinates; M92 counts from `zero`, as far as that is given."""
+        """The step of a motion in machine coordinates; with M92, relative to `zero`, as far as that is given."""
         end = self.target(words, machine=True)
         if zero is not None:
             end |= {axis: end[axis] + zero.get(axis, NAN) for axis in words if axis in end}
@@ -100,7 +100,7 @@ class KlartextFollower(AxisFollower):
         return step
 
     def _took_statement(self, lead: str) -> bool:
-        """Take in a line that says something of tools, units or the control of the tip; whether it is one."""
+        """Apply a line about tools, units, coordinates, parameters or TCP; False for any other line."""
         if lead.startswith("TOOL CALL"):
             self._call_tool(lead)
         elif lead.startswith(("CYCL DEF 247", "Q339")):
@@ -130,7 +130,7 @@ class KlartextFollower(AxisFollower):
         return True
 
     def _tilt(self, lead: str) -> None:
-        """PLANE SPATIAL or RESET: into a tilted plane, or out of it; with TURN and MOVE the rotary axes turn."""
+        """Apply PLANE SPATIAL or RESET: begin a tilted plane, or end it; with TURN and MOVE the rotary axes turn."""
         plane = PlaneBlock.of(lead)
         if plane is None or (self.turn is not None and not self.turn.tilted):
             self.lost["frame"] = "a plane that this reader does not know"
@@ -156,7 +156,7 @@ class KlartextFollower(AxisFollower):
             self.forget_place()
 
     def _transform(self, cycle: str, text: str) -> None:
-        """A line of cycle 7, a shift of the zero point, or of cycle 10, a turn about it."""
+        """Apply a line of cycle 7, a datum shift, or of cycle 10, a rotation about the datum."""
         numbers = TRANSFORM_WORD.findall(text)
         if self.lost or self.tcp or "".join(map("".join, numbers)) != re.sub(r"[ \t]", "", text.partition(";")[0]):
             self.lost["frame"] = f"cycle {cycle} in a form that this reader does not know"
@@ -187,12 +187,12 @@ class KlartextFollower(AxisFollower):
             self.unsay()
 
     def length_of(self, tool: int | str) -> float | None:
-        """The length of a tool with its oversize, mm, if it is given."""
+        """The length of a tool with its oversize, mm; None if it is not given."""
         length = super().length_of(tool)
         return None if length is None else length + self.oversize
 
     def _set_datum(self, lead: str) -> None:
-        """CYCL DEF 247 with its number, which may stand in the next line; until it does the datum is not known."""
+        """Apply CYCL DEF 247; its datum number may stand in the next line."""
         found = DATUM.search(lead)
         if found and (self.datum or lead.startswith("CYCL")):
             self.system = f"PRESET{found[1]}"
@@ -200,7 +200,7 @@ class KlartextFollower(AxisFollower):
         self.datum = found is None and lead.startswith("CYCL")
 
     def _path(self, row: int, line: TextLine, lead: str, words: Mapping[str, TextWord]) -> AxisStep:
-        """A motion by a path function."""
+        """The step of a path function."""
         turn, keys = line.word("PA"), {word.name for word in line.codes}
         if lead == "LN":
             step = self.step(row, Kind.FEED, dict(self.at), line, "a surface normal or a direction of the tool (LN)")
@@ -229,7 +229,7 @@ class KlartextFollower(AxisFollower):
         return step
 
     def _hole(self, row: int, line: TextLine, over: dict[str, float]) -> AxisStep:
-        """The cycle that is defined, over a place."""
+        """The step of a hole by the defined drilling cycle, over a place."""
         call = HoleCall.of_parameters(self.drilling, self.variables)
         step = self.called_hole(row, line, over, call)
         if not self.drilling or math.isnan(call.bottom):
@@ -237,7 +237,7 @@ class KlartextFollower(AxisFollower):
         return step
 
     def _arc_about_pole(self, step: AxisStep, turn: TextWord | None, clockwise: bool) -> AxisStep:
-        """C to a place, or CP by an angle: that may be more than a turn."""
+        """The step of an arc about the pole: C to a place, or CP by an angle, which may be more than a turn."""
         if any(math.isnan(self.pole.get(axis, NAN)) for axis in "XY"):
             step.why = NO_POLE
             return step
@@ -248,7 +248,7 @@ class KlartextFollower(AxisFollower):
         return step
 
     def _leads_straight(self, line: TextLine) -> bool:
-        """Whether a line only brings axes straight to places; takes in its motion and feed if so."""
+        """Whether a line is only a straight motion; if so, its kind and feed are applied."""
         for name, *_ in line.path:
             if name not in self.at:
                 return False
@@ -264,7 +264,7 @@ class KlartextFollower(AxisFollower):
         return True
 
     def _turned_about_pole(self, turn: TextWord) -> dict[str, float]:
-        """Where a turn about the pole leads, in the plane."""
+        """The end, in the plane, of a turn about the pole."""
         x, y = self.pole.get("X", NAN), self.pole.get("Y", NAN)
         if turn.value is None or turn.counted != "+" or not {"X", "Y"} <= set(self.at):
             return dict.fromkeys(("X", "Y"), NAN)

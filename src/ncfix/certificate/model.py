@@ -1,4 +1,4 @@
-"""What the machine model expects of a correction: which commands bring the real tip where a perfect one would be."""
+"""The machine model of the certificate: the commands that bring the real tip to the place of a perfect one."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from ncfix.values import frozen
 
 FLAT = 1e-6
 LEVER = 100.0
-"""mm; what a turn counts beside lengths where the nearest place of a motion is looked for, as of a table that large."""
+"""Lever arm, mm, by which turns are weighed against lengths when the nearest place of a motion is searched."""
 PROBE = 100.0
-"""mm; the tip of a tool that is so much longer is that much farther along it."""
+"""Additional tool length, mm, by which the direction of the tool is found."""
 SHORT_MM, SHORT_RAD = 2.0, 0.02
-"""Straight motions that lead no axis farther are short."""
+"""Largest way of an axis, mm and rad, in a short straight motion."""
 
 
 @frozen(slots=False)
 class TipModel:
-    """A calibrated machine with the workpiece in its place."""
+    """A calibrated machine with the workpiece at its place; `columns`: those of X, Y and Z."""
 
     machine: Machine
     columns: tuple[int, int, int]
 
     @classmethod
     def of(cls, machine: Machine) -> TipModel | None:
-        """None for a machine without three linear axes X, Y and Z."""
+        """The model of a machine; None for a machine without three linear axes X, Y and Z."""
         names = machine.axis_names
         if not all(name in names and not machine.rotary[names.index(name)] for name in "XYZ"):
             return None
@@ -42,12 +42,12 @@ class TipModel:
 
     @property
     def leads(self) -> bool:
-        """Whether X Y Z bring the tip to every place wherever the rotary axes are."""
+        """Whether X Y Z can bring the tip to every place, for all positions of the rotary axes."""
         ways = self.machine.linear_ways
         return ways is not None and abs(np.linalg.det(ways)) > FLAT
 
     def internal(self, rows: Sequence[Sequence[float]] | Array) -> Array:
-        """Positions in mm and degree as mm and rad, (n, n_axes)."""
+        """(n, n_axes) positions given in mm and degree, as mm and rad."""
         found = np.array(rows, dtype=np.float64).reshape(-1, len(self.machine.axes))
         found[:, self.machine.rotary] *= math.pi / 180
         return found
@@ -57,7 +57,7 @@ class TipModel:
         return offset + command @ ways
 
     def joints(self, command: Array, tcp: Mask, length: Array) -> Array:
-        """Axis positions for commands (n, n_axes), those under tool-centre-point control included."""
+        """(n, n_axes) axis positions for commands (n, n_axes), also those under tool-centre-point control."""
         q = command.copy()
         if tcp.any():
             found = self.machine.xyz_for_tip(command[tcp], self.columns, self._at_zero(command[tcp]), length[tcp])
@@ -76,7 +76,7 @@ class TipModel:
         return command
 
     def turned(self, numbers: Sequence[float], length: float, on: bool) -> Sequence[float]:
-        """A command, mm and degree, as it is when tool-centre-point control goes on or off."""
+        """The command, mm and degree, for the same axis positions after tool-centre-point control goes on or off."""
         if not self.leads or any(map(math.isnan, (*numbers, length))):
             return [math.nan] * len(numbers)
         q, every, tool = self.internal([numbers]), np.array([True]), np.array([length])
@@ -87,7 +87,7 @@ class TipModel:
 
     @cached_property
     def rotary_way(self) -> RotaryWay | None:
-        """How two rotary axes point the tool; None for machines with others."""
+        """The directions of the tool by two rotary axes; None for a machine without exactly two."""
         axes = np.flatnonzero(self.machine.rotary)
         if len(axes) != 2:
             return None
@@ -102,10 +102,10 @@ class TipModel:
         return RotaryWay(directions, self.machine.ranges[axes])
 
     def aimed(self, meant: Array, tcp: Mask, length: Array, direction: Array, turned: Array | None = None) -> Array:
-        """The commands that are right for what is meant, both (n, n_axes); NaN where there are none.
+        """(n, n_axes) the exactly corrected commands for commands `meant` (n, n_axes); NaN if there are none.
 
-        direction  (n, n_axes) signs of the motion
-        turned     (n, n_axes) where rotary axes are instead, of a correction that turns them, too
+        direction  (n, n_axes) directions of motion
+        turned     (n, n_axes) positions of the rotary axes, of a correction that changes them, too
         """
         q = self.joints(meant, tcp, length)
         begin, target = q, None
@@ -118,7 +118,7 @@ class TipModel:
         return self.commands(result, tcp, length)
 
     def strays(self, ways: Ways, length: Array) -> Array:
-        """How far the tool is from where an even turn in a plane has it at most, (n,) rad; 0 where it does not turn."""
+        """(n,) largest deviation of the tool direction from an even turn in a plane, rad; 0 if it does not turn."""
         axes = self.machine.rotary
         found = np.zeros(len(ways.start))
         turns = np.flatnonzero((ways.start[:, axes] != ways.end[:, axes]).any(axis=1))
@@ -136,7 +136,7 @@ class TipModel:
         return found
 
     def gaps(self, meant: Array, done: Array, tcp: Mask, length: Array, direction: Array) -> Array:
-        """How far the real tip with commands `done` is from where `meant` wants it, (n,) mm."""
+        """(n,) distance of the real tip under commands `done` from the perfect tip under commands `meant`, mm."""
         state = State(length, direction)
         off = self.machine.gaps(self.joints(meant, tcp, length), [self.joints(done, tcp, length)], state)[0]
         gap: Array = np.linalg.norm(off, axis=1)
@@ -145,7 +145,7 @@ class TipModel:
 
 @frozen
 class Ways:
-    """Motions as the control makes them: straight in all axes, or X Y Z on a circle; commands in mm and rad."""
+    """Motions as the control interpolates them: straight in all axes, or X Y Z on a circle; commands in mm and rad."""
 
     start: Array
     end: Array
@@ -155,11 +155,11 @@ class Ways:
     sweep: Array
     columns: tuple[int, int, int]
     turn: Array | None
-    """(n, 3, 3), how the coordinates are turned in which arcs lie; None where none are."""
+    """(n, 3, 3) rotation of the coordinates of arcs; None if none is turned."""
 
     @classmethod
     def of(cls, model: TipModel, steps: ProgramSteps, at: Indices) -> Ways:
-        """The ways of steps (n,)."""
+        """The ways of steps `at` (n,)."""
         turn = steps.turn[at]
         return cls(
             model.internal(steps.start[at]),
@@ -173,16 +173,16 @@ class Ways:
         )
 
     def _numbers(self, here: Indices, places: Array) -> Array:
-        """X Y Z (k, 3) in the coordinates of the arcs that motions (k,) are."""
+        """X Y Z (k, 3) in the coordinates of arcs `here` (k,)."""
         return places if self.turn is None else np.einsum("kji,kj->ki", self.turn[here], places)
 
     def is_short(self, rotary: Mask) -> Mask:
-        """Which motions are straight and lead no axis far, (n,)."""
+        """(n,) whether the motion is straight and short in all axes."""
         far = np.abs(self.end - self.start) > np.where(rotary, SHORT_RAD, SHORT_MM)
         return ~(far.any(axis=1) | self.arc)
 
     def at(self, row: Indices, share: Array) -> Array:
-        """The commands at shares (k,) of motions (k,), shape (k, n_axes)."""
+        """(k, n_axes) the commands at shares (k,) of motions `row` (k,)."""
         begin, end = self.start[row], self.end[row]
         found: Array = begin + share[:, None] * (end - begin)
         on = np.flatnonzero(self.arc[row])
@@ -205,7 +205,7 @@ class Ways:
         return found
 
     def share(self, row: Indices, place: Array, rotary: Mask) -> Array:
-        """Where on motions (k,) a place (k, n_axes) is nearest, as a share; of arcs by the angle."""
+        """(k,) share of motions `row` (k,) that is nearest to `place` (k, n_axes); for arcs, by the angle."""
         way, weight = self.end[row] - self.start[row], np.where(rotary, LEVER**2, 1.0)
         square = np.einsum("ij,ij,j->i", way, way, weight)
         with np.errstate(all="ignore"):

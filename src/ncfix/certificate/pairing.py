@@ -1,8 +1,8 @@
-"""The second reader: which lines of the corrected program stand for which line of the original.
+"""The second reader: the lines of the corrected program that replace each line of the original.
 
-A correction changes numbers, adds words of axes behind others, and puts further lines behind the line of a motion that
-it splits. All else has to stay. So lines that hold more than a path are found again by their other words; between them,
-lines are told apart by where they lead.
+A correction changes numbers, adds words of axes behind others, and adds lines behind the line of a motion that it
+splits. Everything else must stay. So a line that holds more than a path is found again by its other words; between such
+lines, motions are assigned by the places to which they lead.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from ncfix.certificate.text import Text, hash_of
 from ncfix.values import mutable
 
 AHEAD = 8
-"""Lines that are looked at for where a line that should be here has gone."""
+"""Number of lines that are searched for the last piece of a motion."""
 FAR = 30
-"""Lines that are looked at for where two programs agree again."""
+"""Number of lines that are searched for the place at which two programs agree again."""
 SEVERAL = 3
-"""So many lines are looked at one by one before those behind them are compared at once."""
+"""Number of lines that must agree one by one before the following ones are compared in columns."""
 MOTION = {
     Family.WORDS: re.compile(r"[ \t]*(?<![A-Z])G[ \t]*0?[0-3](?![\d.])", re.IGNORECASE),
     Family.KLARTEXT: re.compile(r"[ \t]*(?<![\w.])(?:L|CC|CP|CR|C|DR[+-])(?![\w.+-])", re.IGNORECASE),
 }
 STOPS = re.compile(r"[ \t]*(?<![A-Z])(?:M[ \t]*0*(?:0|1|2|30|60)|G[ \t]*0*9)(?![\d.])", re.IGNORECASE)
-"""Words that hold the program or the tool at the end of a motion."""
+"""Words that stop the program or the motion at the end of a block."""
 LATE = {
     Family.WORDS: re.compile(rf"{STOPS.pattern}|[ \t]*(?<![A-Z])M[ \t]*0*(?:5|9|99)(?![\d.])", re.IGNORECASE),
     Family.SINUMERIK: re.compile(rf"{STOPS.pattern}|[ \t]*(?<![A-Z])M[ \t]*0*17(?![\d.])", re.IGNORECASE),
@@ -42,7 +42,7 @@ LATE = {
         re.IGNORECASE,
     ),
 }
-"""Words that act at the end of a motion, with those of `STOPS`: the last of its pieces may have them."""
+"""Words that act at the end of a motion, including `STOPS`; the last of its pieces may have them."""
 ARCS = ("C", "CP", "CR")
 """Arcs of Klartext."""
 SKIP = re.compile(r"[ \t]*/\d?")
@@ -54,7 +54,7 @@ PACE = re.compile(
 
 
 class LinePair(NamedTuple):
-    """An original line, and the first and the last of the lines in its place (indices)."""
+    """An original line, and the first and last corrected line that replace it (indices from 0)."""
 
     row: int
     first: int
@@ -62,14 +62,14 @@ class LinePair(NamedTuple):
 
 
 class LinePairs(Sequence[LinePair]):
-    """Pairs in the order of their lines."""
+    """Pairs of lines in the order of the original."""
 
     def __init__(self, numbers: Iterable[int] = ()) -> None:
         self._numbers = array("i", numbers)
 
     @property
     def columns(self) -> NDArray[np.int32]:
-        """(n, 3) as in `LinePair`."""
+        """(n, 3) the pairs as rows, with the columns of `LinePair`."""
         return np.array(self._numbers, dtype=np.int32).reshape(-1, 3)
 
     def __len__(self) -> int:
@@ -88,16 +88,16 @@ class LinePairs(Sequence[LinePair]):
         return LinePair(*self._numbers[first : first + 3])
 
     def append(self, row: int, first: int, last: int) -> None:
-        """One more pair."""
+        """Add a pair."""
         self._numbers.extend((row, first, last))
 
     def append_run(self, row: int, at: int, count: int) -> None:
-        """So many lines with one line each in their place."""
+        """Add `count` consecutive pairs in which one line replaces one line, from lines `row` and `at` on."""
         both = np.arange(count, dtype=np.int32)[:, None] + np.array([row, at, at], dtype=np.int32)
         self._numbers.frombytes(both.tobytes())
 
     def pop(self) -> LinePair:
-        """Take the last one out."""
+        """Remove and return the last pair."""
         last = self[-1]
         del self._numbers[-3:]
         return last
@@ -105,12 +105,21 @@ class LinePairs(Sequence[LinePair]):
 
 BLOCK = re.compile(rf"N({NUMBER})")
 NO_KEY, EMPTY_KEY = 0, 1
-"""Of lines that hold only a path, and of those that hold nothing."""
+"""Keys of lines that hold only a path, and of empty lines."""
 
 
 @mutable
 class Pairing:
-    """Two programs, and how near a corrected line leads to where the correction of an original one should."""
+    """Assigns the lines of a corrected program to those of its original.
+
+    nearness  (original line, corrected line) -> whether the latter leads where the former's correction should
+    run_of    (original line, corrected line, count) -> number of following lines of which that surely holds one by one
+    moves     whether an original line is a motion
+    followed  whether it is known where an original line leads
+    foreign   whether a correction may rewrite an original line in a form unknown to this reader
+    holes     lines at which a drilling cycle is called, of the original and of the corrected program
+    unsure    original lines among which the assignment of added lines is not clear
+    """
 
     original: Text
     corrected: Text
@@ -123,7 +132,6 @@ class Pairing:
     pairs: LinePairs = field(default_factory=LinePairs)
     faults: list[BlockFault] = field(default_factory=list)
     unsure: set[int] = field(default_factory=set)
-    """Original lines among which nobody can say which added line belongs to which."""
 
     def run(self) -> None:
         """Find `pairs` and `faults`."""
@@ -140,9 +148,9 @@ class Pairing:
                 i, j = self._apart(own, other, i, j)
 
     def _keys(self, text: Text, holes: Collection[int]) -> Sequence[int]:
-        """What the lines of a program hold besides a path and its pace, as a number; alike lines have the same.
+        """The keys of the lines of a program: a number for the words besides path and feed, equal for equal words.
 
-        holes  lines at which a cycle is called: other lines may say what they hold
+        holes  lines at which a cycle is called: their key is `NO_KEY`, because a correction may divide their words
         """
         lines = text.read
         if lines is None:
@@ -165,7 +173,7 @@ class Pairing:
         return array("q", found)
 
     def _key(self, line: TextLine) -> str | None:
-        """What a line holds besides a path and its pace; None for a line that holds nothing else."""
+        """The text of a line besides its path and feed; None if there is none."""
         if line.odd:
             return line.rest
         if line.plain and line.path and not line.rest:
@@ -180,11 +188,14 @@ class Pairing:
         return PACE.sub("", bare) if line.path else bare
 
     def _stretch(self, own: Sequence[int], other: Sequence[int], i: int, j: int) -> tuple[int, int]:
-        """Lines that hold a path only, from here on in both; the line before may have been split, too."""
+        """Pair a stretch of lines that hold only a path, from lines i and j on; the line before may be split, too.
+
+        Returns the lines behind the stretch.
+        """
         end, stop = _end_of_paths(own, i), _end_of_paths(other, j)
         if self.pairs and self.pairs[-1].row == i - 1 and self.original.lines[i - 1].path:
             i, j = i - 1, self.pairs.pop().first
-        more = (stop - j) - (end - i)  # lines that must have been put in from here on
+        more = (stop - j) - (end - i)  # number of lines added from here on
         row, astray = i, False
         while row < end:
             count = min(end - row, stop - j) - 1
@@ -213,7 +224,7 @@ class Pairing:
         return end, stop
 
     def _last_piece(self, row: int, first: int, more: int, stop: int) -> int:
-        """The last of the lines that stand for one; what puts a feed or a pole back stands behind its last piece."""
+        """The last of the lines that replace line `row`: its last piece, or a line that restores feed or pole."""
         last = self._last(row, first, first + max(more, 0), min(stop, first + AHEAD))
         if last + 1 >= stop or more <= last - first:
             return last
@@ -226,7 +237,7 @@ class Pairing:
         return last + (feed or (pole and not _begins(following, "CC", *ARCS)))  # a pole before an arc belongs to that
 
     def _puts_back(self, at: int, following: TextLine) -> bool:
-        """Whether a line that calls a hole, or gives it another depth, ends what was put round the hole before it."""
+        """Whether line `at`, which calls a hole or sets its depth, restores the state behind the hole before it."""
         line, lines = self.corrected.lines[at], self.corrected.lines
         if self.original.family is Family.KLARTEXT:
             return line.rest.strip().upper().startswith("FN 2") and not following.says(line)
@@ -234,7 +245,7 @@ class Pairing:
         return not (leads and "CYCLE" in line.rest.upper()) and not following.says(line)
 
     def _is_gone(self, row: int, at: int, end: int) -> bool:
-        """Whether a line is not there any more: the next one leads where its correction should, and it does not."""
+        """Whether original line `row` is missing: corrected line `at` fits the next original line, but not this one."""
         return (
             row + 1 < end
             and self.followed(row)
@@ -246,22 +257,22 @@ class Pairing:
         )
 
     def _last(self, row: int, first: int, most: int, stop: int) -> int:
-        """The first of these lines that leads where the correction of an original line should.
+        """The first line from `first` on that leads where the correction of original line `row` should.
 
-        most  as many lines are there more than in the original; if a line is lost elsewhere, it may be a later one
+        most  last line that it can be by the number of added lines; if a line is lost elsewhere, up to before `stop`
 
-        If none does, the line itself has changed.
+        If there is none, the line itself has changed, and `first` is returned.
         """
         ours, theirs = self.original.lines[row], self.corrected.lines[first]
         if (ours.rest, ours.path) == (theirs.rest, theirs.path):
-            return first  # left as it was programmed; what follows brings the tool back
+            return first  # left as programmed; a later line brings the tool back
         found = next((at for at in range(first, most + 1) if self.nearness(row, at)), None)
         if found is None and self.followed(row) and not self.nearness(row + 1, most + 1):
             found = next((at for at in range(most + 1, stop) if self.nearness(row, at)), None)
         return first if found is None else found
 
     def _apart(self, own: Sequence[int], other: Sequence[int], i: int, j: int) -> tuple[int, int]:
-        """Lines that hold more than a path and differ: one is lost, added, or changed."""
+        """Handle different lines that hold more than a path: one is lost, added, or changed. Returns the next lines."""
         here = other[j] if j < len(other) else NO_KEY
         there = own[i] if i < len(own) else NO_KEY
         lost, more = _ahead(own, i, here), _ahead(other, j, there)
@@ -292,7 +303,7 @@ class Pairing:
 
 
 def _number(key: str | None) -> int:
-    """A number for what a line holds, the same for the same; that two texts have one by chance is harmless."""
+    """The key for a text besides path and feed, equal for equal texts; a chance collision is harmless."""
     if not key:
         return NO_KEY if key is None else EMPTY_KEY
     block = BLOCK.match(key)
@@ -300,14 +311,14 @@ def _number(key: str | None) -> int:
 
 
 def _end_of_paths(keys: Sequence[int], at: int) -> int:
-    """The first line from here on that holds more than a path."""
+    """The first line from `at` on that holds more than a path."""
     while at < len(keys) and keys[at] == NO_KEY:
         at += 1
     return at
 
 
 def _ahead(keys: Sequence[int], at: int, wanted: int) -> int:
-    """How far behind a line there is one with this key, `FAR` if there is none near."""
+    """The distance from line `at` to the next line with key `wanted`; `FAR` if there is none near."""
     if wanted in (NO_KEY, EMPTY_KEY):
         return FAR
     return next((k for k in range(1, FAR) if at + k < len(keys) and keys[at + k] == wanted), FAR)
@@ -319,7 +330,7 @@ def _begins(line: TextLine, *names: str) -> bool:
 
 
 def hole_faults(pairing: Pairing, pair: LinePair, call: HoleCall) -> list[str]:
-    """What is wrong with the text of the lines that stand for a hole whose cycle is called."""
+    """The faults of the text of the lines that replace a hole whose cycle is called."""
     family, line = pairing.original.family, pairing.original.lines[pair.row]
     pieces = pairing.corrected.lines[pair.first : pair.last + 1]
     led, names = [piece for piece in pieces if piece.path], [word.name for word in line.path]
@@ -343,10 +354,10 @@ def hole_faults(pairing: Pairing, pair: LinePair, call: HoleCall) -> list[str]:
 
 
 def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> list[str]:
-    """What is wrong with the text of the lines that stand for one.
+    """The faults of the text of the lines that replace a line.
 
-    arc    the motion is an arc: it may have become straight, and its radius a centre
-    timed  its F is an inverse time, and its pieces have parts of it
+    arc    the motion is an arc: its pieces may be straight, and a radius may have become a centre
+    timed  its F is an inverse time, so that its pieces have other values
     """
     family, line = pairing.original.family, pairing.original.lines[pair.row]
     pieces = pairing.corrected.lines[pair.first : pair.last + 1]
@@ -383,14 +394,14 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> lis
 
 
 def _has_only_more_axes(line: TextLine, other: TextLine) -> bool:
-    """Whether a plain line has the words of another in their order, and perhaps more axes behind them."""
+    """Whether plain line `other` has the words of plain line `line` in order, and at most more axes behind them."""
     if not (line.plain and other.plain and (line.rest, line.block) == (other.rest, other.block)):
         return False
     return [word.name for word in other.path[: len(line.path)]] == [word.name for word in line.path]
 
 
 def _late_faults(line: TextLine, pieces: Sequence[TextLine], late: re.Pattern[str]) -> list[str]:
-    """What is wrong with the words of pieces that act at the end of their block."""
+    """The faults of pieces in words that act at the end of a block."""
     if _words(STOPS, line.rest) != _words(STOPS, pieces[-1].rest):
         return ["a stop is not at the end of the pieces of its block"]
     if sorted(_words(late, line.rest)) != sorted(word for piece in pieces for word in _words(late, piece.rest)):
@@ -403,6 +414,6 @@ def _words(which: re.Pattern[str], text: str) -> list[str]:
 
 
 def _paced(ours: str, theirs: str, line: TextLine, timed: bool) -> bool:
-    """Whether only a feed was put in or changed, for a turn of rotary axes alone, or an inverse time."""
+    """Whether the texts differ in the feed only, and it may change: a turn of rotary axes alone, or inverse time."""
     turn = bool(line.path) and all(word.name in "ABC" for word in line.path)
     return (turn or timed) and PACE.sub("", ours).strip() == PACE.sub("", theirs).strip()

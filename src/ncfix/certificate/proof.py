@@ -1,8 +1,8 @@
-"""The proof: every block of the original against what stands for it in the corrected program.
+"""The proof: every block of the original against the lines that replace it in the corrected program.
 
-A block is proved if all its text but the numbers of its path is untouched, and the corrected motion, followed by a
-reader of its own, brings the real tip where it is meant to be: at the end to half a digit of the control, on the way
-within the tolerance. It is faulty if one of these is wrong for sure, and not proved where this reader cannot tell.
+A block is proved if its text is unchanged except for the numbers of its path, and the corrected motion, followed by an
+independent reader, brings the real tip to its intended place: at the end to half a digit of the control, on the way
+within the tolerance. It is faulty if one of these is surely wrong, and not proved if this reader cannot tell.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from ncfix.certificate.text import Indices, Text, same_but_axes
 from ncfix.machine import Machine
 
 TURNED = 1e-9
-"""rad, the same of rotary axes."""
+"""Difference, rad, up to which rotary positions agree; `SLACK` for linear ones."""
 PLAIN_STRATEGIES = frozenset(("rotary-then-linear", "position"))
 AS_IF = 4e-4
-"""mm; where the program has not said where an axis stands, the others are corrected as if it stood in its place."""
+"""Allowance, mm, if the place of an axis is not known: the others are corrected as if it stood in its place."""
 OFF = "{} ends {} from where the correction belongs"
 UNSAID = "the program has not said where an axis stands"
 UNSURE = "which added lines belong to which block is not known"
@@ -48,11 +48,11 @@ def prove(
 ) -> BlockProof:
     """Compare a program with its correction for a machine.
 
-    dialect       by whose name the family of the language is known; empty: found out
-    tolerance_um  of the way; the stamp of the corrected program wins
+    dialect       name of the dialect, which gives the family of the language; empty: found from the text
+    tolerance_um  tolerance of the way; that of the stamp of the corrected program takes precedence
     """
     collects = gc.isenabled()
-    gc.disable()  # there is nothing to collect, only a million of words to look through
+    gc.disable()  # there are no cycles to collect, but a million words that the collector would visit
     try:
         family = Family.of(original, dialect)
         first, second = Text.of(original, family), Text.of(corrected, family)
@@ -81,7 +81,7 @@ def prove(
 
 
 class Prover(Deviations):
-    """Judges two programs."""
+    """Judges the blocks of an original and its correction."""
 
     def __init__(self, first: Text, second: Text, machine: Machine, given: Given, tolerance_um: float) -> None:
         super().__init__(first, second, machine, given, tolerance_um)
@@ -90,13 +90,13 @@ class Prover(Deviations):
         self.polar: set[int] = set()
         if second.family is Family.KLARTEXT:
             self.polar = {row for row, line in second.apart() if line.word("PA")}
-        """Lines of the corrected program whose digits are those of an angle about a pole."""
+        """Lines of the corrected program with an angle about a pole, whose digits limit the accuracy of the place."""
         self.begin_apart: set[int] = set()
-        """Motions that begin elsewhere in another position of block delete: `fix` does not split them, and rapids may
-        leave axes without a word where they stand."""
+        """Motions that begin elsewhere in another position of block delete: `fix` does not split them, and their rapids
+        may leave axes without a word where they stand."""
 
     def paired(self) -> Pairing:
-        """Which lines stand for which."""
+        """The pairs of original lines and the corrected lines that replace them."""
         moves, nearness = self.ours.__contains__, (self.leads_there, self.lead_there)
         holes = ((), ()) if self.first.family is Family.WORDS else (self.calls, self.calls_there)
         pairing = Pairing(self.first, self.second, *nearness, moves, self.is_followed, self._is_foreign, holes)
@@ -104,7 +104,7 @@ class Prover(Deviations):
         return pairing
 
     def run(self, pairing: Pairing) -> BlockProof:
-        """Compare all blocks."""
+        """Judge all blocks."""
         self._stamps()
         for fault in pairing.faults:
             if near := self._foreign_near(fault, pairing):
@@ -154,7 +154,7 @@ class Prover(Deviations):
         return self.proof
 
     def _are_plain(self, pairs: Indices, unsure: Set[int]) -> Mask:
-        """Which pairs (n, 3) are plain motions of one line that differ in numbers of axes only."""
+        """(n,) which pairs (n, 3) are plain motions, replaced by one line that differs in numbers of axes only."""
         ours, first, second = self.ours, self.first.read, self.second.read
         row, at, last = pairs.T
         found: Mask = (at == last) & (ours.at[row] >= 0)
@@ -199,7 +199,7 @@ class Prover(Deviations):
             self.proof.fault(text, line, number)
 
     def _foreign_near(self, fault: BlockFault, pairing: Pairing) -> int:
-        """The original line at which lines are wrong, if that may be due to what this reader does not know; else 0."""
+        """The original line near a fault, if a line there is unknown to this reader and may be its cause; else 0."""
         row = fault.original - 1
         if not fault.original:
             rows, _, last = pairing.pairs.columns.T
@@ -212,13 +212,13 @@ class Prover(Deviations):
         return row in self.foreign or (step is not None and step.foreign)
 
     def _changed(self, pair: LinePair) -> bool:
-        """Whether anything of a line has changed."""
+        """Whether a line has changed at all."""
         return pair.first != pair.last or not self.first.lines[pair.row].says(self.second.lines[pair.first])
 
     # -- what this reader can follow ----------------------------------------------------------------------------------
 
     def _hindrance(self, step: AxisStep, pair: LinePair) -> str:
-        """Why a motion cannot be proved."""
+        """Why a motion cannot be proved; "" if it can, or is judged here (a motion in machine coordinates)."""
         if step.why:
             return step.why
         if step.kind == Kind.FIXED:
@@ -244,9 +244,9 @@ class Prover(Deviations):
         return ""
 
     def _roughly(self, step: AxisStep, pair: LinePair) -> None:
-        """Of a block that is not followed: no absolute number may change by more than the largest correction.
+        """Roughly judge a block that cannot be proved: its numbers must not change by more than the largest correction.
 
-        Nor the place to which it leads, where that is known, but not the way.
+        The same holds for the place to which it leads, if that is known. Its way is not judged.
         """
         line, last = self.first.lines[pair.row], self.second.lines[pair.last]
         if line.odd or line.doubled() or step.foreign or pair.first != pair.last:
@@ -270,7 +270,7 @@ class Prover(Deviations):
     # -- motions ------------------------------------------------------------------------------------------------------
 
     def _motions(self, row: Indices, first: Indices, last: Indices) -> None:
-        """Judge motions that this reader can follow, given as in `LinePair`."""
+        """Judge motions that this reader can follow, given as columns of `LinePair`."""
         before = self.theirs.before
         moved = Moved(row, first, last, self.ours.at[row], before[first], before[last + 1])
         whole = self._are_whole(moved)
@@ -297,7 +297,7 @@ class Prover(Deviations):
         return [self.theirs[row] for row in range(pair.first, pair.last + 1) if row in self.theirs]
 
     def _are_whole(self, moved: Moved) -> Mask:
-        """Of which motions, and their pieces, everything is known that they are judged by, (m,)."""
+        """(m,) motions for which everything is known, of them and their pieces, by which they are judged."""
         theirs = self.theirs
         unknown = ~theirs.followed | ~np.isfinite(theirs.end).all(axis=1)
         counts = np.concatenate([[0], np.cumsum(unknown)])
@@ -310,7 +310,7 @@ class Prover(Deviations):
         return found
 
     def _incomplete(self, pair: LinePair) -> None:
-        """Say why a motion cannot be judged, or what is wrong with what its pieces are."""
+        """Note why a motion cannot be judged, or the fault of its pieces."""
         step, number = self.ours[pair.row], self.first.lines[pair.row].number
         line, pieces = self.second.lines[pair.last].number, self._pieces_of(pair)
         broken = next((piece.why for piece in pieces if piece.why in (NO_POLE, NO_CENTRE, NO_CIRCLE)), "")
@@ -322,7 +322,7 @@ class Prover(Deviations):
             self.proof.fault("the block does not move as it did", line, number)
 
     def _right_ends(self, moved: Moved) -> Mask:
-        """Whether nothing is wrong with the ends of motions, (m,); where that is not sure `_end` says more."""
+        """(m,) whether the ends of motions are surely right; the others are judged by `_end`."""
         if not len(moved.row) or self.strategy == "full" or self.model is None:
             return np.zeros(len(moved.row), dtype=bool)
         ours = self.ours
@@ -347,7 +347,7 @@ class Prover(Deviations):
         return found
 
     def _same_pace(self, moved: Moved) -> Mask:
-        """Whether all pieces of motions have the feed of the original, (m,)."""
+        """(m,) whether all pieces of a motion have the feed of the original."""
         ours, theirs, owner, pieces = self.ours, self.theirs, moved.owner, moved.pieces
         feed, mode = ours.feed[moved.ours][owner], ours.feed_mode[moved.ours][owner]
         alike = (feed == theirs.feed[pieces]) | (np.isnan(feed) & np.isnan(theirs.feed[pieces]))
@@ -358,7 +358,7 @@ class Prover(Deviations):
         return same
 
     def _end(self, step: AxisStep, pieces: Sequence[AxisStep], pair: LinePair) -> tuple[str, bool]:
-        """What is wrong with the end of a motion, and whether that is only not proved."""
+        """The fault of the end of a motion, "" if it has none, and whether the block is only not proved for it."""
         assert self.model is not None
         at = self.ours.at[step.row]
         done = self.ends(self.theirs, self.theirs.at[pieces[-1].row])
@@ -404,7 +404,7 @@ class Prover(Deviations):
         return (UNSAID, True) if not said.all() else ("", False)
 
     def _pace(self, step: AxisStep, pieces: Sequence[AxisStep]) -> str:
-        """What is wrong with the feed; turns of rotary axes alone get another one."""
+        """The fault of the feed, "" if it has none; a turn of rotary axes alone may get another feed."""
         if len(pieces) == 1 and (pieces[0].feed, pieces[0].feed_mode) == (step.feed, step.feed_mode):
             return ""
         if step.kind not in (Kind.FEED, Kind.ARC):
@@ -422,7 +422,7 @@ class Prover(Deviations):
         return "" if all(feed == step.feed for feed in feeds) else "the feed has changed"
 
     def _ways(self, moved: Moved) -> None:
-        """Judge the ways of motions whose ends are right."""
+        """Judge the ways of motions with right ends."""
         self.proof.proved += len(moved.row)
         self.proof.proved_motions += len(moved.row)
         kinds = self.ours.kind[moved.ours]
@@ -477,9 +477,9 @@ class Prover(Deviations):
                 self.proof.fault(text, self.second.lines[pair.first].number, number)
 
     def _excuse(self, pair: LinePair, aside: float) -> str:
-        """Why a way beyond the tolerance is not called faulty; empty if it is.
+        """The reason for which a way beyond the tolerance is not proved rather than faulty; "" if it is faulty.
 
-        aside  rad, how far even turns of axes lead the tool out of the plane in which the control turns it
+        aside  deviation, rad, of the tool, with evenly turning axes, from the plane in which the control turns it
         """
         if aside > ASIDE:
             return BY_VECTOR

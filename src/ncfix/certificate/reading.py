@@ -1,8 +1,8 @@
-"""The second reader: the lines of a program as words, by regular expressions of its own.
+"""The second reader: the lines of a program as words, parsed by regular expressions of its own.
 
-It reads three families: word addresses (LinuxCNC, ISO 6983, Fanuc and its like), SINUMERIK and Klartext. It knows no
-grammar and no meaning. Of each line it keeps which words a correction may change (axes, arc centres and radii), and all
-other text as it stands, byte for byte. What it cannot take apart it calls odd, with the reason.
+It reads three families: word addresses (LinuxCNC, ISO 6983, Fanuc and similar), SINUMERIK and Klartext. It knows no
+grammar and no meaning. For each line it keeps the words that a correction may change (axes, arc centres and radii), and
+all other text byte for byte. A line that it cannot parse is marked as odd, with the reason.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ AXES = frozenset("XYZABCUVW")
 
 
 class Family(Enum):
-    """How the words of a program look."""
+    """The families of languages, by the form of their words."""
 
     WORDS = "word addresses"
     SINUMERIK = "SINUMERIK"
@@ -27,7 +27,7 @@ class Family(Enum):
 
     @classmethod
     def of(cls, text: bytes, dialect: str) -> Family:
-        """The family of a dialect, by its name, or else what the beginning of a text shows."""
+        """The family of a dialect by its name, or else by the beginning of the text."""
         head = text[:4096].upper()
         if dialect == "heidenhain" or re.search(rb"^\s*(?:\d+\s+)?BEGIN\s+PGM\b", head, re.MULTILINE):
             return cls.KLARTEXT
@@ -40,7 +40,7 @@ class TextWord(NamedTuple):
     """A word: its name, its number or formula as written, and its value.
 
     value    None for a formula
-    counted  "" as the mode says, "+" an increment, "=" absolute, whatever the mode
+    counted  "+": an increment, "=": absolute, whatever the mode; "": by the mode
     """
 
     name: str
@@ -50,7 +50,7 @@ class TextWord(NamedTuple):
 
     @property
     def decimals(self) -> int:
-        """Digits behind the point; a formula has more than a control takes."""
+        """Number of decimals; for a formula, more than any control has."""
         return 99 if self.value is None else len(self.number.replace(",", ".").partition(".")[2])
 
 
@@ -63,9 +63,9 @@ class TextLine:
     codes    all other words, in order
     rest     the text without the words of `path` and the blanks before them; Klartext: without the block number
     block    number of the block, Klartext only
-    odd      why the line cannot be taken apart; empty if it could be
-    skipped  the switch of block delete that it asks, 1 for `/`; 0: none
-    plain    all words are letters with numbers, no word of `path` twice, and those are axes
+    odd      why the line cannot be parsed; empty if it could be
+    skipped  its switch of block delete, 1 for `/`; 0: none
+    plain    all words are letters with numbers; the words of `path` are distinct axes
     """
 
     number: int
@@ -82,15 +82,15 @@ class TextLine:
         return next((word for word in self.path if word.name == name), None)
 
     def code(self, name: str) -> float | None:
-        """The value of the last of the other words with this name."""
+        """The value of the last word of `codes` with this name."""
         return next((word.value for word in reversed(self.codes) if word.name == name), None)
 
     def says(self, other: TextLine) -> bool:
-        """Whether two lines say the same."""
+        """Whether two lines have the same words and text."""
         return (self.rest, self.path, self.block) == (other.rest, other.path, other.block)
 
     def doubled(self) -> str:
-        """The name of an axis or centre that has two words; empty if there is none."""
+        """The name of an axis or centre with two words; empty if there is none."""
         if self.plain:
             return ""
         names = [word.name for word in self.path]
@@ -102,7 +102,7 @@ FORMULA = r"[+-]?(?:\#+(?:\d+|<[^<>]*>)|\#?\[(?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\
 WORD_ADDRESS = re.compile(
     rf"(\([^()]*\)|;.*|%)|([A-Za-z])[ \t]*(?:({NUMBER})(?!\.?[\d\#\[])|({FORMULA}))|([^ \t])",
 )
-"""Comment; letter, and its number or formula; anything else."""
+"""Groups: comment; letter; its number; its formula; anything else."""
 FLOW = re.compile(
     r"\b(?:GOTO|IF|WHILE|END|THEN|DO)\d*\b|\bO[ \t]*(?:<|\d+[ \t]*(?:SUB|CALL|IF|WHILE|DO|REPEAT|END|ELSE|R))"
 )
@@ -112,17 +112,17 @@ ASSIGNMENT = re.compile(
     r"((?:[^=();<>A-Z]|<[^<>=()]*>|[A-Z]{2,})+)(?:\([^()]*\)[ \t]*)*(?:;.*)?",
     re.IGNORECASE,
 )
-"""A line that gives a variable the value of a formula, and does nothing else."""
+"""A line that only assigns the value of a formula to a variable."""
 
 
 class _Rest:
-    """The text of a line without what is cut out of it."""
+    """The text of a line without the words that are cut out."""
 
     def __init__(self, text: str) -> None:
         self.text, self.pieces, self.at = text, list[str](), 0
 
     def cut(self, start: int, end: int) -> None:
-        """Leave out a word, and the blanks before it."""
+        """Cut out a word, and the blanks before it."""
         self.pieces.append(self.text[self.at : start].rstrip(" \t"))
         self.at = end
 
@@ -131,16 +131,16 @@ class _Rest:
 
 
 def _piece(text: str, start: int) -> str:
-    """What stands at a place of a line, up to a blank; a control character is a piece."""
+    """The text from a place of a line up to a blank; or one control character."""
     return (text[start:].split() or [text[start]])[0]
 
 
 SKIPPED = re.compile(r"[ \t]*(?:N[ \t]*\d+[ \t]*)?/(\d?)", re.IGNORECASE)
-"""The mark of block delete with its switch: it begins a line, or follows the number."""
+"""The mark of block delete with its switch, at the begin of a line or behind its number."""
 
 
 def _marked(number: int, text: str) -> tuple[TextLine, int]:
-    """A line that knows its switch of block delete, and where the digit of that ends."""
+    """A line object with its switch of block delete, and the end of that mark."""
     mark = SKIPPED.match(text)
     return (TextLine(number), 0) if mark is None else (TextLine(number, skipped=int(mark[1] or 1)), mark.end())
 
@@ -243,7 +243,7 @@ KLARTEXT_STATEMENT = re.compile(
     r"|CYCL CALL[ \t]*(?:;|$)"
     r"|FUNCTION (?:TCPM F (?:TCP|CONT) AXIS POS PATHCTRL (?:AXIS|VECTOR)|RESET TCPM)[ \t]*(?:;|$)"
 )
-"""Blocks of Klartext that say something and lead no axis, as the follower knows them."""
+"""Statements of Klartext that move no axis, and that the follower knows."""
 KLARTEXT_FLOW = re.compile(r"^(?:CALL (?:LBL|PGM)|FN ?(?:9|1[0-2])\b|SEL PGM|CALL SELECTED|PATTERN|CYCL CALL)")
 
 

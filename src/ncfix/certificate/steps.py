@@ -1,4 +1,4 @@
-"""The second reader: what the lines of a program do, line by line and in columns."""
+"""The second reader: the steps of a program, that is, the motions of its lines, one by one and in columns."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from ncfix.values import mutable
 
 NAN = math.nan
 PLANES = {17: ("X", "Y", "Z"), 18: ("Z", "X", "Y"), 19: ("Y", "Z", "X")}
-"""The axes of a plane, and the one across it."""
+"""The axes of a plane, and the axis normal to it."""
 NO_CIRCLE = "an arc that does not close"
 AT_ONCE = 500
-"""Steps that are put into columns together."""
+"""Number of steps that are put into columns together."""
 
 
 class Kind(IntEnum):
-    """What a step is."""
+    """The kinds of steps."""
 
     RAPID = 0
     FEED = 1
@@ -36,15 +36,16 @@ class Kind(IntEnum):
 
 @mutable
 class AxisStep:
-    """What one line does; positions are commands, mm and degree, NaN where they are not known.
+    """The motion of one line. Positions are commands, mm and degree, NaN if not known.
 
-    row     the index of the line
-    said    axes that the program itself has brought to their places
-    named   the words of the axes
-    why     why this reader cannot follow it; empty if it does
+    row     index of the line
+    said    for each axis, whether the program itself has set its position
+    named   letter of an axis -> its word
+    why     why this reader cannot follow it; empty if it can
     tcp     X Y Z are those of the tool tip in the workpiece
-    unit    mm in a unit of linear words
-    centre  of arcs, mm, in the order X Y Z; `across`: the axis normal to its plane; `sweep`: rad, about that axis
+    length  tool length, mm
+    unit    unit of linear words, mm
+    centre  centre of an arc, mm, as X Y Z; `across`: the axis normal to its plane; `sweep`: angle about it, rad
     """
 
     row: int
@@ -63,18 +64,18 @@ class AxisStep:
     across: str = "Z"
     sweep: float = 0.0
     foreign: bool = False
-    """It is because of what the program uses before, or in this line, that a correction may rewrite otherwise."""
+    """A correction may rewrite the line in a form unknown to this reader, because of features of the program."""
     unsteady: bool = False
     """Cutter radius compensation is on: the control offsets the contour."""
     by_vector: bool = False
-    """The tool turns in a plane, not its axes at even rates."""
+    """The tool turns in a plane, instead of the rotary axes evenly."""
     turn: Array | None = None
-    """(3, 3), how the coordinates of the program are turned; None: they are not."""
+    """(3, 3) rotation of the coordinates of the program; None: they are not turned."""
 
     def lead_round(
         self, names: Sequence[str], plane: int, centre: Mapping[str, float], clockwise: bool, radius: float | None
     ) -> AxisStep:
-        """Make it the arc in a plane (17, 18 or 19) about a centre, mm, or with a radius; `why` says if there is none.
+        """Make the step an arc in a plane (17, 18, 19) about a centre, or with a radius, mm; sets `why` if impossible.
 
         names  the letters of the axes
         """
@@ -109,7 +110,7 @@ class AxisStep:
 
 
 class ModesInForce(NamedTuple):
-    """What is in force in a run of lines: offsets and scales of the numbers of axes (a,), and as in `AxisStep`."""
+    """The modes in a run of lines: offsets and scales of words (a,), `counting` (G91), and others as in `AxisStep`."""
 
     offsets: Array
     scales: Array
@@ -124,12 +125,13 @@ class ModesInForce(NamedTuple):
 
 
 class StraightRun(NamedTuple):
-    """Lines one behind the other that only bring axes straight to places: k steps of a axes.
+    """Consecutive straight motions: k steps of a axes.
 
-    start, end  (k, a), mm and degree; `said` (k, a)
-    written     (k, a) digits behind the points of words
-    feed        (k,), NaN for none; `rapid` (k,)
-    unsaid      (k,) a word is an increment from where the program has not brought the axis
+    row         index of the first line
+    start, end  (k, a) positions, mm and degree; `said` (k, a): whether the program has set them
+    written     (k, a) decimals of the words
+    feed        (k,) NaN: none; `rapid` (k,): whether it is a rapid
+    unsaid      (k,) a word is an increment of an axis whose position the program has not set
     """
 
     row: int
@@ -151,9 +153,9 @@ class StraightRun(NamedTuple):
         modes: ModesInForce,
         klartext: bool,
     ) -> StraightRun | None:
-        """Follow lines from `rows[0]` up to `rows[1]`; None where an axis has absolute and incremental words.
+        """Follow lines from `rows[0]` up to `rows[1]`; None if an axis has both absolute and incremental words.
 
-        before  where the axes stand, which the program has brought there, whether rapids are on, and the feed
+        before  positions of the axes, whether the program has set them, whether rapids are on, and the feed
         """
         at, said, rapid, feed = before
         part = slice(*rows)
@@ -184,30 +186,30 @@ class StraightRun(NamedTuple):
 
 
 def _carried(word: Indices, values: Array, before: float) -> Array:
-    """The numbers of words, each up to the next; -1: no word."""
+    """The values of modal words: each is in force up to the next; `word` (k,): index in `values`, -1: no word."""
     last = np.maximum.accumulate(np.where(word >= 0, np.arange(len(word)), -1))
     return np.where(last >= 0, values[word[last]], before)
 
 
 class ProgramSteps(Mapping[int, AxisStep]):
-    """The steps of a program by the index of their line, and in columns (n,) or (n, a) as in `AxisStep`.
+    """The steps of a program: by the index of their line, and in columns (n,) or (n, a) as in `AxisStep`.
 
-    at        (lines + 1,) which step a line is; -1: none
-    before    (lines + 1,) how many steps there are before a line
-    why       which of `reasons`
-    feed      NaN for none
-    across    0 1 2 for X Y Z
-    unsaid    a word is an increment from where the program has not brought the axis
-    written   digits behind the points of the words of axes
-    turn      (n,) which of `rotations` (t, 3, 3) the coordinates have; 0: they are not turned
+    at        (lines + 1,) number of the step of each line; -1: none
+    before    (lines + 1,) number of steps before each line
+    why       (n,) index in `reasons`
+    feed      (n,) NaN: none
+    across    (n,) 0, 1 or 2 for X, Y or Z
+    unsaid    (n,) a word is an increment of an axis whose position the program has not set
+    written   (n, a) decimals of the words of axes
+    turn      (n,) index in `rotations` (t, 3, 3) of the rotation of the coordinates; 0: they are not turned
     """
 
     def __init__(self, lines: Sequence[TextLine], names: Sequence[str]) -> None:
-        """No steps yet; `add` and `add_run` take them in, in the order of their lines."""
+        """A program without steps; `add` and `add_run` add them in the order of their lines."""
         self._lines, self._names = lines, names
         self._size, self._waiting = 0, list[AxisStep]()
         self._kept: dict[int, AxisStep] = {}
-        """Those whose words are formulas, by their indices: what these are worth is not in the line."""
+        """Number -> step, for steps with formulas as words, whose values are not in the line."""
         most, axes = len(lines), len(names)
         self.rows, self.kind = np.empty(most, dtype=np.int32), np.empty(most, dtype=np.int8)
         self.start, self.end, self.said = np.empty((most, axes)), np.empty((most, axes)), np.empty((most, axes), bool)
@@ -221,7 +223,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
         self._reason_of = {"": 0}
 
     def add(self, step: AxisStep) -> None:
-        """One more step."""
+        """Add a step."""
         if any(word.value is None for word in self._lines[step.row].path):
             self._kept[self._size + len(self._waiting)] = step
         self._waiting.append(step)
@@ -229,7 +231,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
             self._enter_each()
 
     def add_run(self, run: StraightRun) -> None:
-        """So many more."""
+        """Add the steps of a run."""
         self._enter_each()
         count, modes = len(run.rapid), run.modes
         at = slice(self._size, self._size + count)
@@ -243,7 +245,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
         self._size += count
 
     def done(self) -> ProgramSteps:
-        """All steps are there."""
+        """Finish the columns; all steps have been added."""
         self._enter_each()
         for name, column in list(vars(self).items()):
             if isinstance(column, np.ndarray) and name != "rotations":
@@ -252,12 +254,12 @@ class ProgramSteps(Mapping[int, AxisStep]):
         self.at[self.rows] = np.arange(self._size)
         self.before = np.searchsorted(self.rows, np.arange(len(self._lines) + 1)).astype(np.int32)
         self.followed = self.why == 0
-        """(n,) whether this reader could follow it."""
+        """(n,) whether this reader could follow the step."""
         self._made: dict[int, AxisStep] = {}
         return self
 
     def _enter_each(self) -> None:
-        """Put the steps that wait into columns."""
+        """Put the waiting steps into columns."""
         steps, self._waiting = self._waiting, []
         at = slice(self._size, self._size + len(steps))
         self._size += len(steps)
@@ -281,7 +283,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
                 self.turn[index] = self._turn_of(step.turn)
 
     def _turn_of(self, rotation: Array | None) -> int:
-        """Which of `rotations` one is, a new one if need be."""
+        """The index of a rotation in `rotations`; it is added if it is new."""
         if rotation is None:
             return 0
         same = (self.rotations[1:] == rotation).all(axis=(1, 2))
@@ -291,7 +293,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
         return 1 + int(np.argmax(same))
 
     def step_of(self, row: int) -> int:
-        """Which step a line is; -1: none."""
+        """The number of the step of a line; -1: none."""
         return int(self.at[row]) if 0 <= row < len(self.at) else -1
 
     def __len__(self) -> int:
@@ -315,7 +317,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
         return found
 
     def _step(self, row: int, at: int) -> AxisStep:
-        """A step made of the columns."""
+        """The step of a line, made from the columns."""
         feed, arc = float(self.feed[at]), self.kind[at] == Kind.ARC
         x, y, z = self.centre[at].tolist() if arc else (NAN, NAN, NAN)
         return AxisStep(
@@ -342,5 +344,5 @@ class ProgramSteps(Mapping[int, AxisStep]):
 
 
 def _digits(word: TextWord | None) -> int:
-    """Digits behind the point of a word with a plain number."""
+    """Number of decimals of a word with a plain number; 0 for a formula, or without a word."""
     return 0 if word is None or word.value is None else min(word.decimals, MOST_DIGITS)

@@ -1,8 +1,8 @@
-"""The second reader: a program as lines, those of one shape taken apart at once.
+"""The second reader: a program as lines, with all lines of one shape parsed at once.
 
-Most lines of a program differ from others in their numbers only. So numbers are found in the whole text, and what is
-left of a line is its shape, which is taken apart once. Lines are made when they are looked at; of the plain ones their
-numbers also stand in columns.
+Most lines of a program differ from others in their numbers only. So the numbers are found in the whole text; the rest
+of a line is its shape, which is parsed once. Line objects are made on access; the numbers of plain lines are also kept
+in columns.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from ncfix.values import frozen
 
 Indices = NDArray[np.signedinteger[Any]]
 PART = 4096
-"""Lines that are taken apart at once."""
+"""Number of lines parsed at once."""
 MOST_DIGITS = 99
-"""Behind a point, that are counted."""
+"""Largest number of decimals that is counted."""
 KEPT = 1000
-"""Lines that are kept for those who look again soon."""
+"""Number of line objects that are cached."""
 
 
 @frozen
@@ -34,8 +34,8 @@ class Text:
     """A program as lines.
 
     source   its text without the stamp
-    numbers  (n,) those of the lines, from 1
-    read     its lines as they were read, of which the plain ones stand in columns; None if `lines` are others
+    numbers  (n,) line numbers, from 1
+    read     the lines with the numbers of plain ones in columns; None if `lines` were made in another way
     """
 
     family: Family
@@ -47,7 +47,7 @@ class Text:
 
     @classmethod
     def of(cls, source: bytes, family: Family) -> Text:
-        """Read a program; the line of its stamp, if it has one, is kept apart."""
+        """Read a program; the line of its stamp, if it has one, is taken out."""
         text = source
         if b"\r" in text:
             text = RETURNS.sub(b"", text) if b"\n" in text else text.replace(b"\r", b"\n")
@@ -68,23 +68,23 @@ class Text:
         return cls(family, text, numbers, read, stamp, read)
 
     def says(self, other: Text) -> bool:
-        """Whether both say the same, line by line."""
+        """Whether both have equal words, line by line."""
         return len(self.lines) == len(other.lines) and all(map(TextLine.says, self.lines, other.lines))
 
     def apart(self) -> Iterator[tuple[int, TextLine]]:
-        """The lines that are not plain, and their indices."""
+        """(index, line) of each line that is not plain."""
         lines = self.read
         rows = range(len(self.lines)) if lines is None else np.flatnonzero(~lines.plain).tolist()
         return ((row, self.lines[row]) for row in rows)
 
     @property
     def is_renumbered(self) -> bool:
-        """Whether its blocks have the numbers that `fix --block-numbers renumber` gives, in each program of a text."""
+        """Whether the blocks of each program in the text are numbered as by `fix --block-numbers renumber`."""
         if self.family not in RENUMBERED:
             return False
         numbers, (start, step) = self.block_numbers, RENUMBERED[self.family]
         ahead = np.diff(numbers, prepend=start - step)
-        gaps = int((ahead == 2 * step).sum())  # there is the number of the stamp
+        gaps = int((ahead == 2 * step).sum())  # the number of the stamp
         counted = bool(((ahead == step) | (ahead == 2 * step) | (numbers == start)).all())
         return counted and gaps <= (self.stamp is not None)
 
@@ -95,13 +95,13 @@ class Text:
         return np.array(pattern.findall(self.source), dtype=np.float64)
 
     def without_block_numbers(self) -> Text:
-        """The program where nobody looks at block numbers, nor at those to which jumps go."""
+        """The program without block numbers, including those to which jumps go."""
         lines = [replace(line, block="", rest=ANY_BLOCK_NUMBER.sub("", line.rest)) for line in self.lines]
         return replace(self, lines=lines, read=None)
 
 
 class StampFound(NamedTuple):
-    """What a corrected program says of itself: the line, the hash of the machine, strategy and tolerance (um)."""
+    """The stamp of a corrected program: its line, the hash of the machine, strategy and tolerance, um."""
 
     line: int
     machine: str
@@ -112,20 +112,20 @@ class StampFound(NamedTuple):
 STAMP = re.compile(rb"\bncfix \d\S* machine ([0-9a-f]+) strategy ([\w-]+) tolerance ([\d.e-]+) um", re.IGNORECASE)
 RETURNS = re.compile(rb"\r+(?=\n|\Z)")
 RENUMBERED = {Family.KLARTEXT: (0, 1), Family.SINUMERIK: (10, 10)}
-"""The first number that blocks get anew, and the step to the next."""
+"""First block number and step after renumbering."""
 BLOCK_NUMBER = re.compile(rb"^[ \t]*/?[ \t]*N[ \t]*(\d+)", re.IGNORECASE | re.MULTILINE)
 LEADING_NUMBER = re.compile(rb"^[ \t]*(?:/[ \t]*)?(\d+)(?=[ \t]|$)", re.MULTILINE)
 ANY_BLOCK_NUMBER = re.compile(r"[ \t]*\bN[ \t]*\d+[ \t]*", re.IGNORECASE)
 
 
 class PlainShape(NamedTuple):
-    """What lines have in common that differ in their numbers only.
+    """The common part of lines that differ in their numbers only.
 
-    path      names of the words that a correction may change, and which of the numbers of a line they have
-    codes     the same of the other words
+    path      (name, index of its number in the line) of each word that a correction may change
+    codes     the same for all other words
     rest      the other text, with {} for each number in it
-    held      which numbers these are
-    numbered  the first number is that of a block of Klartext
+    held      the indices of these numbers
+    numbered  the first number is a block number of Klartext
     """
 
     path: tuple[tuple[str, int], ...]
@@ -136,19 +136,19 @@ class PlainShape(NamedTuple):
 
     @property
     def is_straight(self) -> bool:
-        """Whether such a line only brings axes straight to places, if its G is 0 or 1."""
+        """Whether such lines are straight motions and nothing else, if their G is 0 or 1."""
         names = [name for name, _ in self.codes if name != "N"]
         return bool(self.path) and len(set(names)) == len(names) and STRAIGHT.issuperset(names)
 
 
 PLAIN_NUMBER = re.compile(rf"({NUMBER})")
 PLAIN_DECIMAL = re.compile(rf"(?<![Rr])({DECIMAL})")
-"""Numbers of Klartext, but for that of R0."""
+"""Numbers of Klartext, except that of R0."""
 NUMBER_RUN, DECIMAL_RUN = re.compile("([-+.0-9]+)"), re.compile("([-+.,0-9]+)")
-"""The same, faster, where all that these find are numbers."""
+"""Faster patterns, for texts in which all of their matches are numbers."""
 AFTER_R = re.compile("[Rr][-+.,0-9]")
 SHOWN = {0x100 + ord(character): character for character in "-+.,0123456789"}
-"""Characters that are hidden while numbers of Klartext are looked for, and as what: those behind an R."""
+"""Characters behind an R, which are replaced while numbers of Klartext are searched, by their replacements."""
 MARK = "\0"
 PLAIN_SHAPES = {
     Family.WORDS: re.compile(rf"((?:[ \t]*[A-Za-z][ \t]*{MARK})+)[ \t]*(?:\([^(){MARK}]*\)|;[^{MARK}]*)?"),
@@ -158,25 +158,25 @@ PLAIN_SHAPES = {
         re.IGNORECASE,
     ),
 }
-"""Shapes that are read at once: words of a letter and a number, a comment without numbers behind them."""
+"""Shapes that can be parsed: words of a letter and a number, and a comment without numbers behind them."""
 PLAIN_WORD = re.compile(rf"[ \t]*(?:([A-Za-z]+)[ \t]*{MARK}|(R0|RL|RR|FMAX))", re.IGNORECASE)
 
 
 STRAIGHT = frozenset(("G", "F", "L", "FMAX"))
-"""Words beside those of axes in lines that only bring axes straight to places, and N."""
+"""Words, besides those of axes and N, that a straight motion may have."""
 
 
 class Lines(Sequence[TextLine]):
-    """The lines of a program, taken apart when they are looked at.
+    """The lines of a program; line objects are made on access.
 
-    kinds     (n,) which of `shapes` each line has; a shape is None if it takes more than a look to read it
-    plain     (n,) which lines have another one
-    begins    (n + 1,) the first number of each line, and one more
-    values    all numbers of the program; `decimals` their digits behind the point, -1 for those without a point
+    kinds     (n,) index in `shapes` of the shape of each line; a shape is None if its lines are read one by one
+    plain     (n,) whether the line has a shape that is not None
+    begins    (n + 1,) index of the first number of each line, and at last the number of numbers
+    values    all numbers of the program; `decimals`: their decimals, -1 for numbers without a point
     """
 
     def __init__(self, family: Family, source: bytes, numbers: Indices) -> None:
-        """Of a text with so many lines, and their numbers."""
+        """The lines of a text; `numbers` (n,): their line numbers."""
         self.family, self.numbers, self.source = family, numbers, source
         self.klartext = family is Family.KLARTEXT
         self.text = np.frombuffer(source, dtype=np.uint8)
@@ -213,7 +213,7 @@ class Lines(Sequence[TextLine]):
         return found
 
     def digits(self, number: int) -> str:
-        """A number as it is written."""
+        """Number `number` as written."""
         place = int(self.places[number])
         return self.source[place : place + int(self.sizes[number])].decode("latin-1")
 
@@ -242,9 +242,9 @@ class Lines(Sequence[TextLine]):
         return TextLine(number, words, codes, rest, block, plain=True)
 
     def _part(self, first: int, known: dict[str, int]) -> tuple[Indices, Indices, Indices, Array, Signs]:
-        """Of lines from one on their kinds, and of their numbers the places, sizes, values and digits behind the point.
+        """Parse a batch of lines from `first` on: kinds of the lines; places, sizes, values and decimals of numbers.
 
-        known  takes in keys that are new
+        known  key of a shape -> its kind; new keys are added
         """
         count = min(PART, len(self) - first)
         start, end = int(self.starts[first]), max(int(self.starts[first + count]) - 1, 0)
@@ -267,7 +267,7 @@ class Lines(Sequence[TextLine]):
         return kinds, ends - sizes, sizes, values, decimals
 
     def _numbers(self, text: str) -> tuple[list[str], Array]:
-        """A text cut at its numbers, which are every other piece, and their values."""
+        """A text split at its numbers, which are every second piece, and their values."""
         fast, thorough = (DECIMAL_RUN, PLAIN_DECIMAL) if self.klartext else (NUMBER_RUN, PLAIN_NUMBER)
         for pattern in (fast, thorough):
             pieces = pattern.split(text)
@@ -281,17 +281,17 @@ class Lines(Sequence[TextLine]):
         raise AssertionError("what these patterns match are numbers")
 
     def are_whole(self, numbers: Indices) -> Mask:
-        """Which numbers are digits only."""
+        """(k,) whether numbers consist of digits only."""
         return (self.decimals[numbers] < 0) & (self.text[self.places[numbers]] >= ord("0"))
 
     def by_shape(self) -> Iterator[tuple[PlainShape | None, Indices]]:
-        """The shapes, and the lines that have them."""
+        """(shape, indices of its lines) of each shape."""
         order = np.argsort(self.kinds, kind="stable")
         bounds = np.searchsorted(self.kinds[order], np.arange(len(self.shapes) + 1))
         return zip(self.shapes, (order[begin:end] for begin, end in pairwise(bounds.tolist())), strict=True)
 
     def hashes(self, lines: int, *numbers: Indices) -> Index:
-        """What so many lines have for numbers (lines,), as these are written, in one; of one number as `hash_of`."""
+        """(lines,) a hash of the written forms of several numbers (lines,) each; for one number, equal to `hash_of`."""
         found = np.zeros(lines, dtype=np.uint64)
         for each in numbers:
             sizes, places = self.sizes[each], self.places[each]
@@ -302,7 +302,7 @@ class Lines(Sequence[TextLine]):
         return found.view(np.intp)
 
     def same(self, numbers: Indices, other: Lines, others: Indices) -> Mask:
-        """Which numbers (k,) are written as those (k,) of another program."""
+        """(k,) whether numbers (k,) have the same written form as numbers (k,) of another program."""
         sizes = self.sizes[numbers]
         found: Mask = sizes == other.sizes[others]
         for size in np.unique(sizes[found]).tolist():
@@ -315,7 +315,7 @@ class Lines(Sequence[TextLine]):
         return found
 
     def straight(self, axes: Sequence[str]) -> StraightLines:
-        """The lines that only bring these axes straight to places, in columns."""
+        """The straight motions of these axes, in columns."""
         n = len(self)
         found = StraightLines(
             np.zeros(n, dtype=bool),
@@ -348,7 +348,7 @@ class Lines(Sequence[TextLine]):
         return found
 
     def _shape(self, key: str) -> PlainShape | None:
-        """The shape that a text has whose numbers are marks; None if it takes more than a look to read it."""
+        """The shape of a line whose numbers are replaced by marks; None if its lines must be read one by one."""
         found = PLAIN_SHAPES[self.family].fullmatch(key)
         if found is None or "{" in key or "}" in key:
             return None
@@ -388,7 +388,7 @@ FACTOR = 0x9E3779B97F4A7C15
 
 
 def hash_of(digits: str) -> int:
-    """A number of 64 bits for a number as it is written."""
+    """A hash of 64 bits for the written form of a number."""
     found = 0
     for digit in digits.encode("latin-1"):
         found = (found * FACTOR + digit) & (2**64 - 1)
@@ -396,7 +396,7 @@ def hash_of(digits: str) -> int:
 
 
 def same_but_axes(first: Lines, rows: Index, second: Lines, others: Index) -> Mask:
-    """Which plain lines (n,) have the same words and texts as others (n,), but for numbers of axes and further axes."""
+    """(n,) whether plain lines have the same text as `others`, except for numbers of axes, and further axes there."""
     kinds, theirs = first.kinds[rows], second.kinds[others]
     codes, inverse = np.unique(kinds * len(second.shapes) + theirs, return_inverse=True)
     found = np.zeros(len(rows), dtype=bool)
@@ -419,14 +419,14 @@ def same_but_axes(first: Lines, rows: Index, second: Lines, others: Index) -> Ma
 
 
 class StraightLines(NamedTuple):
-    """Lines that only bring axes straight to places: n lines, a axes.
+    """Straight motions in columns: n lines of the program, a axes.
 
-    is_straight  (n,) which lines these are
-    word         (n, a) where the number of the word of an axis stands among `values`; -1: it has none
-    counted      (n, a) this word is an increment, whatever the mode
-    values       all numbers of the program, and how many `decimals` they have; -1: without a point
-    code, feed   (n,) the same of G, 0 or 1, and of F
-    rapid        (n,) with FMAX
+    is_straight  (n,) whether the line is a straight motion and nothing else; the other columns are for such lines
+    word         (n, a) index in `values` of the number of the axis; -1: it has no word
+    counted      (n, a) the word is an increment, whatever the mode
+    values       all numbers of the program; `decimals`: their decimals, -1 for numbers without a point
+    code, feed   (n,) index in `values` of the numbers of G (0 or 1) and of F; -1: no such word
+    rapid        (n,) whether the line has FMAX
     """
 
     is_straight: Mask

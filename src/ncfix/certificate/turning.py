@@ -17,16 +17,16 @@ AXIS = {"X": 0, "Y": 1, "Z": 2}
 SAME = 1e-9
 MOST_STEPS, MOST_KNOWN = 40, 100
 AS_NEAR = 1e-3
-"""rad; two ways that differ by less are as near."""
+"""Difference of two ways, rad, below which they are equally near."""
 
 
 @frozen
 class TurnedFrame:
-    """Coordinates that a program has turned: numbers `zero + p` are commands `origin + rotation @ p`.
+    """Coordinates turned by a program: numbers `zero + p` mean commands `origin + rotation @ p`.
 
-    columns   which axes X, Y and Z are
+    columns   the columns of X, Y and Z
     rotation  (3, 3); `zero`, `origin` (3,) mm
-    tilted    the numbers are those of the tip in a plane that is fixed to the workpiece, to which the tool is square
+    tilted    the numbers are those of the tip in a plane fixed to the workpiece, with the tool square to it
     """
 
     columns: tuple[int, ...]
@@ -36,7 +36,7 @@ class TurnedFrame:
     tilted: bool
 
     def commands(self, numbers: Array) -> Array:
-        """Numbers (k, n_axes) as commands."""
+        """(k, n_axes) commands that numbers (k, n_axes) mean."""
         found = numbers.copy()
         away = numbers[:, self.columns] - self.zero
         for row, column in enumerate(self.columns):
@@ -46,20 +46,20 @@ class TurnedFrame:
         return found
 
     def numbers(self, command: Array) -> Array:
-        """The inverse of `commands`, of one position (n_axes,)."""
+        """(n_axes,) the inverse of `commands`, for one position (n_axes,)."""
         found, columns = command.copy(), list(self.columns)
         found[columns] = self.zero + self.rotation.T @ (command[columns] - self.origin)
         return found
 
     def said(self, said: Mask) -> Mask:
-        """Of which axes (k, n_axes) the program has said all that their commands are made of."""
+        """(k, n_axes) whether the program has set all numbers on which the command of an axis depends."""
         found, mixed = said.copy(), self.rotation != 0.0
         for row in range(3):
             found[:, self.columns[row]] = said[:, [self.columns[k] for k in range(3) if mixed[row, k]]].all(axis=1)
         return found
 
     def step(self, step: AxisStep) -> AxisStep:
-        """A step that was worked out in numbers."""
+        """A step in numbers, converted to commands."""
         start, end = self.commands(np.array([step.start, step.end]))
         said = self.said(np.array([step.said]))[0]
         centre = self.origin + self.rotation @ (np.array(step.centre) - self.zero)
@@ -73,7 +73,7 @@ class TurnedFrame:
         )
 
     def run(self, run: StraightRun) -> StraightRun:
-        """Steps that were worked out in numbers."""
+        """A run of steps in numbers, converted to commands."""
         return run._replace(
             start=self.commands(run.start),
             end=self.commands(run.end),
@@ -83,7 +83,7 @@ class TurnedFrame:
 
 
 def about(axis: str, degrees: float) -> Array:
-    """A right-handed turn about an axis, (3, 3)."""
+    """(3, 3) right-handed rotation about an axis."""
     k = AXIS[axis]
     i, j = (k + 1) % 3, (k + 2) % 3
     quarter = degrees % 360.0
@@ -96,7 +96,7 @@ def about(axis: str, degrees: float) -> Array:
 
 
 def turned(*turns: tuple[str, float]) -> Array:
-    """Turns about axes, degrees, each as the ones before have left it."""
+    """(3, 3) consecutive rotations about axes, degrees, each axis turned by the rotations before it."""
     found = np.eye(3)
     for axis, degrees in turns:
         found = found @ about(axis, degrees)
@@ -105,10 +105,10 @@ def turned(*turns: tuple[str, float]) -> Array:
 
 @frozen
 class SwivelCall:
-    """What CYCLE800 says.
+    """The meaning of a CYCLE800 call.
 
-    rotation  (3, 3) of the plane; `origin` (3,) in the work offset, in units of the program
-    sense     -1 or 1: the lesser or the greater angle of the axis that tilts the tool
+    rotation  (3, 3) rotation of the plane; `origin` (3,): its origin in the work offset, in units of the program
+    sense     -1 or 1: take the smaller or the larger angle of the axis that tilts the tool
     """
 
     rotation: Array
@@ -117,7 +117,7 @@ class SwivelCall:
 
     @classmethod
     def of(cls, call: str) -> SwivelCall | None:
-        """From the text of a call with plain numbers, its angles about axes one after another; None for others."""
+        """From a call with plain numbers and consecutive rotations about three axes; None for any other call."""
         parts = [part.strip() for part in re.sub(r'"[^"]*"', "", call.partition("(")[2].rstrip(") \t")).split(",")]
         try:
             values = [float(part) if part else 0.0 for part in parts] + [0.0] * 14
@@ -141,12 +141,12 @@ PLANE_WORD = re.compile(
 
 @frozen
 class PlaneBlock:
-    """What a PLANE block of Klartext says.
+    """The meaning of a PLANE block of Klartext.
 
-    rotation  (3, 3); None for RESET
-    positions TURN, MOVE or STAY
-    sign      1 for SEQ+, -1 for SEQ-, 0
-    table     TABLE ROT
+    rotation   (3, 3) rotation of the plane; None for RESET
+    positions  TURN, MOVE or STAY
+    sign       1 for SEQ+, -1 for SEQ-, 0 for neither
+    table      whether it has TABLE ROT
     """
 
     rotation: Array | None
@@ -156,7 +156,7 @@ class PlaneBlock:
 
     @classmethod
     def of(cls, block: str) -> PlaneBlock | None:
-        """From a block in capitals; None where this reader does not know all of it."""
+        """From a block in capitals; None if this reader does not know all of its words."""
         angles, positions, sign = dict.fromkeys("ABC", 0.0), "", 0
         for found in PLANE_WORD.finditer(block, len("PLANE SPATIAL" if "SPATIAL" in block[:14] else "PLANE RESET")):
             if found["odd"] is not None:
@@ -172,31 +172,34 @@ class PlaneBlock:
 
 
 class RotaryWay:
-    """Where two rotary axes go to square the tool to a plane.
+    """The positions of two rotary axes with the tool square to a plane.
 
-    directions  positions of the two (k, 2), rad -> unit vectors (k, 3) from the tip to the spindle in the workpiece
-    travel      (2, 2) rad
+    directions  positions of both axes (k, 2), rad -> unit vectors (k, 3) from the tip to the spindle in the workpiece
+    travel      (2, 2) travels of both axes, rad
     """
 
     def __init__(self, directions: Callable[[Array], Array], travel: Array) -> None:
         self.directions, self.travel = directions, travel
         self._known: dict[tuple[bytes, bytes], tuple[list[Array], bool]] = {}
         self.outer = 0 if self._turns_about_one_line() else 1
-        """Which of the two turns about a line that is fixed in the workpiece."""
+        """The axis (0 or 1) that turns about a line fixed in the workpiece."""
 
     def _turns_about_one_line(self) -> bool:
-        """Whether the first turns about the same line wherever the second stands."""
+        """Whether the first axis turns about the same line for all positions of the second."""
         points = self.directions(np.array([[angle, other] for other in (0.5, 1.3) for angle in (0.0, 2.0, 4.0)]))
         lines = np.cross(points[[1, 4]] - points[[0, 3]], points[[2, 5]] - points[[1, 4]])
         lines /= np.maximum(np.linalg.norm(lines, axis=1), SAME)[:, None]
         return bool(np.abs(lines[0] - lines[1]).max() < SAME)
 
     def to(self, wanted: Array, here: Array, *, sense: int, sign: int, inside: bool, stays: bool) -> Array | None:
-        """Where they go from `here` (2,), rad, so that the tool points along a unit vector (3,).
+        """(2,) positions, rad, nearest to `here` (2,), with the tool along the unit vector `wanted` (3,).
 
-        The nearest way. With `sense` the one with the greater (1) or lesser angle of the inner axis, with `sign` the
-        one with that sign of it; `inside`: within the travels. Where the outer axis is free it stays; if not `stays`,
-        only at zero. None where there is none, where two are as near, or where an axis makes half a turn.
+        sense   1 or -1: take the position with the larger or smaller angle of the inner axis; 0: the nearest
+        sign    1 or -1: the sign of the angle of the inner axis; 0: any
+        inside  within the travels
+        stays   if the outer axis is free, it stays; else there is a result only if it stands at zero
+
+        None if there is none, if two are equally near, or if an axis makes half a turn.
         """
         key = (wanted.tobytes(), here.tobytes())  # programs turn to the same planes again and again
         if key not in self._known:
@@ -222,14 +225,14 @@ class RotaryWay:
         return None if not ways or any(map(_is_half_turn, ways[0] - here)) else ways[0]
 
     def _inside(self, way: Array, here: Array) -> Array | None:
-        """A way within the travels, each axis whole turns away and nearest to `here`."""
+        """The equivalent positions within the travels, by full turns, nearest to `here`; None if there are none."""
         turns = way[:, None] + 2 * math.pi * np.arange(-2, 3)
         good = (turns >= self.travel[:, :1] - 1e-6) & (turns <= self.travel[:, 1:] + 1e-6)
         best = np.argmin(np.where(good, np.abs(turns - here[:, None]), np.inf), axis=1)
         return turns[[0, 1], best] if good.any(axis=1).all() else None
 
     def _ways(self, wanted: Array, here: Array) -> tuple[list[Array], bool]:
-        """The ways, at most half a turn from `here`; whether the outer axis is free: then it stays."""
+        """All positions at most half a turn from `here`, and whether the outer axis is free (then it stays)."""
         grid = np.linspace(-3.0, 3.0, 5)
         at = np.vstack([here, *([[one, other] for one in grid for other in grid])])
         for _ in range(MOST_STEPS):
@@ -255,5 +258,5 @@ class RotaryWay:
 
 
 def _is_half_turn(angle: float) -> bool:
-    """Whether an angle, rad, is half a turn, which may be made either way round."""
+    """Whether an angle, rad, is half a turn, whose direction is ambiguous."""
     return abs(abs(angle) - math.pi) < AS_NEAR

@@ -1,7 +1,7 @@
-"""What a machine is made of: its axes in their order, the tool, and the errors of each. Names follow ISO 230-1.
+"""The parts of a machine: axes, topology, tool, and error effects. Names follow ISO 230-1.
 
-`EYX` is the motion of axis X along Y, `EAC` its tilt about X of axis C: they change with the axis position.
-`EC0Y`, `EX0C` are location errors: where and how the axis line lies. `S` is the spindle, the end of the tool branch.
+`EYX` is the error motion of axis X along Y, `EAC` the tilt of axis C about X: they change with the axis position.
+`EC0Y`, `EX0C` are location errors: direction and place of an axis line. `S` is the spindle, the end of the tool branch.
 docs/conventions.md has the frames and signs.
 """
 
@@ -28,7 +28,7 @@ BASE_AXES: Triad = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def degrees(angle: float) -> float:
-    """An angle in degrees that reads back as exactly this many rad, as short as it can be."""
+    """An angle in degrees, as short as possible, that converts back to exactly this value in rad."""
     near = math.degrees(angle)
     candidates = [round(near, 9), near, math.nextafter(near, math.inf), math.nextafter(near, -math.inf)]
     return next((each for each in candidates if each * DEGREE == angle), near)
@@ -39,14 +39,14 @@ class Axis:
     """A prismatic or revolute joint. Geometry in the base frame with all axes at zero.
 
     name            the axis letter
-    rotary          revolute (rad) or prismatic (mm)
+    rotary          revolute (rad) rather than prismatic (mm)
     workpiece_side  it carries the workpiece rather than the tool
-    direction       unit vector: how the moving body moves when the number grows; of a rotary axis right-handed
+    direction       unit vector of the motion of its body in the positive sense; for a rotary axis right-handed
     point           a point on the axis line, mm
-    range           lowest and highest position, mm or rad; infinite where endless or not given
-    error_axes      the triad along and about which its errors act, as rows
-    moving_frame    that triad turns with the axis itself
-    pitch           mm, of its screw, where known
+    range           lowest and highest position, mm or rad; infinite if endless or not given
+    error_axes      rows: the directions along and about which its errors act
+    moving_frame    the error axes turn with the axis itself
+    pitch           pitch of its screw, mm, if known
     """
 
     name: str
@@ -61,20 +61,20 @@ class Axis:
 
     @property
     def endless(self) -> bool:
-        """A rotary axis that may turn round and round: 370 degrees is where 10 degrees is."""
+        """Whether it is a rotary axis without limits: 370 degrees is the same place as 10 degrees."""
         return self.rotary and not np.isfinite(self.range).any()
 
     @property
     def reference(self) -> Vector:
-        """Where errors of an effect refer to if it does not say: the axis point, or the base origin of a linear one."""
+        """Default reference point of effects, mm: the axis point of a rotary axis, the base origin for a linear one."""
         return self.point if self.rotary else ORIGIN
 
     @property
     def zero_sense(self) -> float:
-        """What turns a location error along or about the axis into the zero offset that is added to its position.
+        """Factor from a location error along or about the axis to the zero offset that is added to its position.
 
-        The file gives the offset as such, so one along an error axis that points against `direction` counts as it is
-        written; of errors that are only partly along the axis, the projection on `direction` counts.
+        It is -1 if the error axis points against `direction`, so that the offset counts as written in the file. Of an
+        error that is only partly along the axis, the projection on `direction` counts.
         """
         against = np.asarray(self.error_axes) @ np.asarray(self.direction) < -1 + 1e-9
         return -1.0 if against.any() else 1.0
@@ -85,13 +85,14 @@ class Axis:
         return DEGREE if self.rotary else 1.0
 
     def along(self, component: str) -> float:
-        """The cosine between the axis and the error axis of a component, X ... C: 1 along or about it, 0 across."""
+        """The cosine of the angle between the axis and the error axis of a component, X to C: 1 along, 0 across."""
         return float(np.asarray(self.error_axes[COMPONENTS.index(component) % 3]) @ np.asarray(self.direction))
 
     def owns(self, component: str) -> bool:
-        """Whether a component is the positioning of the axis: along a linear one, about a rotary one.
+        """Whether a component is the positioning of the axis: along a linear axis, about a rotary one.
 
-        The error axes say so, not the letter: of a W along Z it is Z. Of an axis that is askew to all it is its letter.
+        That depends on the error axes, not on the letter: for a W along Z it is Z. For an axis that is skewed to all
+        error axes, it is the component of its own letter.
         """
         near = abs(self.along(component))
         return (component in LINEAR) != self.rotary and (
@@ -107,13 +108,13 @@ class Axis:
         return direction, np.zeros(3)
 
     def motion(self, position: Array) -> Array:
-        """The nominal motion of its body, shape (...) [mm or rad] -> (..., 4, 4), base frame."""
+        """(..., 4, 4) the nominal motion of its body at positions (...), mm or rad, in the base frame."""
         position = np.asarray(position, dtype=np.float64)
         displacement = position[..., None] * np.asarray(self.direction)
         return se3.turn(displacement, self.point) if self.rotary else se3.shift(displacement)
 
     def file_keys(self) -> dict[str, Any]:
-        """Its table in a machine file; None for the keys left out."""
+        """The keys and values of its table in a machine file; None for keys that are left out."""
         low, high = self.range
         limits = None if math.isinf(low) else [degrees(low), degrees(high)] if self.rotary else [low, high]
         return {
@@ -129,19 +130,23 @@ class Axis:
 
 @frozen
 class GaugeLine:
-    """The end of the tool branch, base frame with all axes at zero: the gauge line, and the way from the tip to it."""
+    """The end of the tool branch in the base frame with all axes at zero.
+
+    direction  unit vector from the tool tip to the gauge line
+    point      the centre of the gauge line, mm
+    """
 
     direction: Vector = (0.0, 0.0, 1.0)
     point: Vector = field(default=ORIGIN)
 
     def tip(self, length: Array) -> Array:
-        """The tip of a tool of this length, shape (...) [mm] -> (..., 3)."""
+        """(..., 3) the tip of tools of length (...), mm."""
         return np.asarray(self.point) - np.asarray(length)[..., None] * np.asarray(self.direction)
 
 
 @frozen
 class Topology:
-    """The axes on both branches, in the order of the string."""
+    """The axes on both branches, in the order of the topology string; `spindle`: S is named before t."""
 
     workpiece: tuple[str, ...]
     tool: tuple[str, ...]
@@ -158,7 +163,7 @@ class Topology:
 
 
 def parse_topology(text: str) -> tuple[Topology | None, list[str]]:
-    """The topology, or what is wrong with the string. Blanks between the letters may be left out."""
+    """The topology of a string, or None and its faults. Blanks between the letters may be left out."""
     letters = text.split() if " " in text.strip() else list(text.strip())
     joints, wrong = letters[1:-1], []
     if letters[:1] != ["w"]:
@@ -196,16 +201,16 @@ class Effect:
     name             ISO 230-1 component
     coefficients     mm (translations) or rad (rotations)
     basis            the functions
-    center, scale    of u, in the unit of the machine file
-    covariance       of the coefficients
+    center, scale    centre and scale of u, in the unit of the machine file
+    covariance       covariance matrix of the coefficients
     reference        the point at which rotations cause no translation, base frame with all axes at zero, mm;
                      None: the axis point of a rotary axis, the base origin for a linear one
-    range            of x: outside it the end values hold; None: the range of the axis
+    range            range of x: outside it the end values hold; None: the range of the axis
     input            the signal x if it is not the axis position: another axis, or a name in `State.inputs`
     times            a second signal whose u multiplies the sum
-    times_center, times_scale   of that u; None: those of `center` and `scale`
-    time_constant_s  the input acts through a first-order lag
-    carried          a location error that carries the whole body with it, rather than the axis line only
+    times_center, times_scale   centre and scale of that u; None: `center` and `scale`
+    time_constant_s  time constant, s, of a first-order lag through which the input acts; None: no lag
+    carried          a location error that moves the whole body, rather than the axis line only
     """
 
     name: str
@@ -225,12 +230,12 @@ class Effect:
 
     @property
     def component(self) -> int:
-        """0..5 for X Y Z A B C."""
+        """The index of its component: 0 to 5 for X Y Z A B C."""
         return COMPONENTS.index(self.name[1])
 
     @property
     def joint(self) -> str:
-        """The axis that it belongs to, or `S`."""
+        """The letter of its axis, or `S` for the spindle."""
         return self.name[-1]
 
     @property
@@ -240,12 +245,12 @@ class Effect:
 
     @property
     def location(self) -> bool:
-        """Whether it tells where the axis lies, not how it moves."""
+        """Whether it is a location error rather than an error motion."""
         return len(self.name) == 4
 
     @property
     def signal(self) -> str | None:
-        """The name of the signal that its basis sees; None if it sees none."""
+        """The name of the signal on which its basis depends; None if there is none."""
         if self.input is not None:
             return self.input
         return self.joint if self.basis.needs_signal else None
@@ -256,7 +261,7 @@ class Effect:
         return any(self.coefficients)
 
     def file_keys(self) -> dict[str, Any]:
-        """Its table in a machine file, in the order in which people read the keys; None for those left out."""
+        """The keys and values of its table in a machine file, in customary order; None for keys that are left out."""
         basis = self.basis
         own = {each: getattr(basis, each.name) for each in fields(basis)}  # type: ignore[arg-type]
         parameters = {
@@ -283,29 +288,29 @@ class Effect:
 
 
 SKEWED = 0.01
-"""Cosine, or one minus it, from which an axis counts as skewed."""
+"""Cosine of an angle, or one minus it, above which an axis counts as skewed."""
 
 LINEAR = "XYZ"
 TURNS_ABOUT = dict(zip("ABC", LINEAR, strict=True))
 """Rotation letter -> the direction that it turns about."""
 IDLE = "no effect unless carried"
-"""Said of what leaves an axis line in itself."""
+"""Remark on a location error that moves an axis line only along or about itself."""
 
 
 JOINTS = 3
-"""Rotary axes in one branch that make an arm."""
+"""Least number of rotary axes in one branch of an arm."""
 
 
 def is_arm(axes: Iterable[Axis]) -> bool:
-    """Whether rotary joints in a row carry the tool or the workpiece, as in a robot."""
+    """Whether several rotary joints (`JOINTS`) carry the tool or the workpiece, as in a robot."""
     held = [each.workpiece_side for each in axes if each.rotary]
     return max(held.count(True), held.count(False)) >= JOINTS
 
 
 def component_title(name: str, axis: Axis | None = None) -> str:
-    """What an ISO 230-1 component is, e.g. "straightness of X in Y".
+    """The title of an ISO 230-1 component, e.g. "straightness of X in Y".
 
-    Without the axis it goes by the letter: X Y Z U V W are linear, others rotary, and A B C turn about X Y Z.
+    Without the axis, its kind follows from the letter: X Y Z U V W are linear, others rotary; A B C turn about X Y Z.
     """
     component, zero, joint = _parts(name)
     about = TURNS_ABOUT.get(component)
@@ -328,13 +333,13 @@ def component_title(name: str, axis: Axis | None = None) -> str:
 
 
 def _by_letter(joint: str) -> Axis:
-    """The axis that a letter usually stands for, in the directions of the base axes."""
+    """The axis for which a letter usually stands, along or about a base axis."""
     place = "XYZABCUVW".find(joint)
     return Axis(joint, joint not in "XYZUVW", True, BASE_AXES[place % 3] if place >= 0 else ORIGIN)
 
 
 def _parts(name: str) -> tuple[str, str, str]:
-    """Component, 0 of a location error, and joint."""
+    """Component, "0" for a location error or "", and joint, of the name of an effect."""
     match = NAME.fullmatch(name)
     if match is None:
         raise ValueError(f"{name!r} is not the name of an ISO 230-1 component")
@@ -358,14 +363,14 @@ def _location_title(component: str, axis: Axis) -> str:
 
 
 def component_names(joints: Iterable[str] = "XYZABC" + SPINDLE) -> tuple[str, ...]:
-    """The components of these joints: error motions first, then location errors."""
+    """The names of all components of these joints: for each joint, error motions first, then location errors."""
     return tuple(f"E{component}{zero}{joint}" for joint in joints for zero in ("", "0") for component in COMPONENTS)
 
 
 def squareness_meaning(name: str) -> str:
-    """What the location error of a linear axis does to the angle to the axis beside it, e.g. "X-Y is 90 deg + EC0Y".
+    """The effect of a squareness on the angle between two linear axes, e.g. "+X to +Y is 90 deg + EC0Y".
 
-    Empty where the name is none of EB0X EC0X EA0Y EC0Y EA0Z EB0Z.
+    Empty unless the name is one of EB0X EC0X EA0Y EC0Y EA0Z EB0Z.
     """
     match = NAME.fullmatch(name)
     if match is None or match[1] not in TURNS_ABOUT or not match[2] or match[3] not in LINEAR:
@@ -380,7 +385,7 @@ def squareness_meaning(name: str) -> str:
 
 
 def instruments_for(name: str) -> str:
-    """The kinds of measurement that see a component, docs/formats.md."""
+    """The kinds of measurement in which a component is visible, see docs/formats.md."""
     component, zero, joint = _parts(name)
     if joint == SPINDLE:
         return "tcp tcp6 probe points" if component in LINEAR else "tcp6 points; others with two tool lengths"
@@ -388,7 +393,7 @@ def instruments_for(name: str) -> str:
 
 
 def usual_basis(name: str, axis: Axis | None = None) -> str:
-    """The basis that suits a component: what identifiability leaves to it. Without the axis it goes by the letter."""
+    """The usual basis of a component, which is identifiable. Without the axis, its kind is guessed from the letter."""
     match = NAME.fullmatch(name)
     if match is None or match[2] or match[3] == SPINDLE:
         return "constant"
@@ -400,7 +405,7 @@ def usual_basis(name: str, axis: Axis | None = None) -> str:
 
 
 def large_size(name: str) -> str:
-    """A size, mm or rad over the travel, that is large for a machine tool in use."""
+    """A size, mm or rad over the travel, that is large for a machine tool in use, as text; "" for an unknown name."""
     match = NAME.fullmatch(name)
     if match is None:
         return ""

@@ -1,11 +1,11 @@
-"""What a basis is: known functions of one signal, whose weighted sum is an error. The smooth ones, and play.
+"""Bases: known functions of one signal whose weighted sum is an error. This module has the smooth ones, and play.
 
-A basis sees u = (x - center) / scale, x in the unit of the machine file (mm, degree, or the unit of a state input).
+The argument of a basis is u = (x - center) / scale, x in the unit of the machine file (mm, degree, or an input's unit).
 Its own parameters are the fields of a frozen dataclass, declared with `key`; the machine file is read and written by
 these declarations, so a plugin's basis needs no code for that. Register one with the hook `register_bases`.
 """
 
-# What the methods mean is said once, in `Basis`.
+# The methods are documented in `Basis`.
 # ruff: noqa: D102
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Basis(ABC):
 
     @abstractmethod
     def slopes(self, u: Array, direction: Array) -> Array:
-        """Their derivatives by u, shape (...) -> (k, ...); at a kink the value of the upper side."""
+        """The derivatives of the functions by u, shape (...) -> (k, ...); at a kink, that of the upper side."""
 
     @abstractmethod
     def feature(self, span: float) -> float:
@@ -61,17 +61,17 @@ class Basis(ABC):
 
     @property
     def needs_direction(self) -> bool:
-        """Whether the direction of motion matters."""
+        """Whether the functions depend on the direction of motion."""
         return False
 
     @property
     def size(self) -> int:
-        """How many coefficients."""
+        """The number of coefficients."""
         return len(self.labels)
 
     @property
     def domain(self) -> tuple[float, float]:
-        """The u between which the functions are given; outside, the end values hold."""
+        """The range of u for which the functions are given; outside, the end values hold."""
         return -np.inf, np.inf
 
     @property
@@ -81,7 +81,7 @@ class Basis(ABC):
 
     @property
     def family(self) -> tuple[object, ...]:
-        """Bases of equal family can be merged into one."""
+        """A key that is equal for bases that can be merged into one."""
         return self.name, self
 
     def merged(self, other: Self) -> Self:
@@ -89,23 +89,23 @@ class Basis(ABC):
         return self
 
     def bounds(self, coefficients: tuple[float, ...], low: float, high: float) -> tuple[float, float, float] | None:
-        """What the sum with these coefficients, its slope and its curvature do not exceed for u from low to high.
+        """Bounds of the size, slope and curvature of the sum with these coefficients for u from low to high.
 
-        Kinks and jumps aside. None if that is not known, or not bounded.
+        Kinks and jumps do not count. None if no bounds are known, or there are none.
         """
         return None
 
     def complaints(self) -> list[tuple[str, str]]:
-        """What is wrong with the parameters: (key, text)."""
+        """(key, text) of each fault of the parameters."""
         return []
 
     def design(self, u: Array, direction: Array | float = 0.0) -> Array:
-        """The functions at u as the row of a design matrix, shape (...) -> (..., k)."""
+        """The functions at u as rows of a design matrix, shape (...) -> (..., k)."""
         u = np.asarray(u, dtype=np.float64)
         return np.moveaxis(self.rows(u, np.broadcast_to(direction, u.shape)), 0, -1)
 
     def derivative(self, u: Array, direction: Array | float = 0.0) -> Array:
-        """Their derivatives by u, shape (...) -> (..., k)."""
+        """The derivatives of the functions by u, shape (...) -> (..., k)."""
         u = np.asarray(u, dtype=np.float64)
         return np.moveaxis(self.slopes(u, np.broadcast_to(direction, u.shape)), 0, -1)
 
@@ -115,7 +115,7 @@ class Basis(ABC):
 
 
 def check_shapes(basis: Basis) -> None:
-    """Raise ValueError for a basis whose functions do not come as one row for each coefficient."""
+    """Raise ValueError for a basis that does not return one row for each coefficient."""
     u = np.array([-0.5, 0.0, 0.5])
     for name, function in (("rows", basis.rows), ("slopes", basis.slopes)):
         shape = np.shape(function(u, np.zeros(3)))
@@ -193,7 +193,7 @@ class Polynomial(Basis):
 
 @frozen
 class Backlash(Polynomial):
-    """Half the play that opens when the axis reverses: +1/2 when it comes moving up, -1/2 when it comes moving down."""
+    """Half the play of an axis: +1/2 if its position was approached in positive direction, -1/2 in negative."""
 
     degree: tuple[int, ...] = key("integers", "which powers of u, one coefficient each", (0,))
     name: ClassVar[str] = "backlash"
@@ -212,7 +212,7 @@ class Backlash(Polynomial):
 
 @frozen
 class Fourier(Basis):
-    """Harmonics of the turn of a rotary axis."""
+    """Harmonics of the angle of a rotary axis."""
 
     order: tuple[int, ...] = key("integers", "harmonics, cos and sin of each in turn")
     name: ClassVar[str] = "fourier"
@@ -259,7 +259,7 @@ class Fourier(Basis):
 
 @frozen
 class Periodic(Fourier):
-    """Harmonics of a period: a screw's pitch, a scale's grating, a gear."""
+    """Harmonics of a period, as of a screw's pitch, a scale's grating, or a gear."""
 
     period: float = key("number", "length of one period, mm or degree")
     name: ClassVar[str] = "periodic"
@@ -287,11 +287,11 @@ def powers(u: Array, degree: tuple[int, ...]) -> Array:
 
 
 HIGHEST = 1000
-"""No error of a machine bends so often."""
+"""Largest power or harmonic that is accepted."""
 
 
 def distinct(name: str, values: tuple[int, ...], lowest: int) -> list[tuple[str, str]]:
-    """A complaint unless the values are given, distinct, none below `lowest` and none beyond `HIGHEST`."""
+    """The complaint about values that are missing, repeated, below `lowest` or beyond `HIGHEST`; none if valid."""
     if not values:
         return [(name, "is empty")]
     if min(values) < lowest:
@@ -304,7 +304,7 @@ def distinct(name: str, values: tuple[int, ...], lowest: int) -> list[tuple[str,
 
 
 def columns_like(values: ArrayLike, u: ArrayLike) -> Array:
-    """Values (k,) in the shape (k, 1, ...), that goes with u (...)."""
+    """Values (k,) in the shape (k, 1, ...), which broadcasts with u (...)."""
     return np.asarray(values, dtype=np.float64).reshape(-1, *np.ones(np.ndim(u), dtype=int))
 
 

@@ -1,9 +1,9 @@
-"""Effects for people: physical ones and bases by name, how large an effect is over the travel, its curve, its units.
+"""Physical effects by name, and effects in human terms: extent over the travel, curves, units, titles.
 
-`spindle-growth`, `backlash-X`, ... stand for one or more components with the basis and the input that the physics asks
-for, zero until they are estimated. `calibrate --effects` and the selection of effects take these names beside those of
-ISO 230-1. Dead weight acts on an axis by the positions of axes that it carries, not of those that carry it (Soons 1993,
-section 2.5, rule 1).
+`spindle-growth`, `backlash-X`, ... stand for one or more components with the basis and the input that the physics
+requires, with coefficients zero until they are estimated. `calibrate --effects` and the selection of effects accept
+these names as well as those of ISO 230-1. Dead weight acts on an axis by the positions of axes that it carries, not of
+those that carry it (Soons 1993, section 2.5, rule 1).
 """
 
 from __future__ import annotations
@@ -28,33 +28,34 @@ from ncfix.plugins import called, handed, registry
 from ncfix.values import frozen
 
 WARM = 20.0
-"""Degree C at which thermal effects are zero."""
+"""Temperature, degrees C, at which thermal effects are zero."""
 HOUR = 3600.0
 LEVER = 100.0
-"""mm: an angle is much if it moves what is this far away by what is much."""
+"""Lever arm, mm, by which a large length is converted into a large angle."""
 STATES_S = (900.0, 7200.0)
-"""Time constants of thermal states, s: where their estimation begins."""
+"""Start values of the time constants of thermal states, s."""
 LINEAR = Polynomial(degree=(1,))
 NO_TIMES: Mapping[str, Any] = {"times": None, "times_center": None, "times_scale": None}
 
 
 class PluginEffect(Protocol):
-    """What a plugin registers with `register_effects`: a name, a title, and the effects of a machine, with zeros."""
+    """The object that a plugin registers with `register_effects`: name, title, and effects with zero coefficients."""
 
     name: str
     title: str
 
     def effects(self, machine: Machine) -> Sequence[Effect]:
-        """The effects that it is made of on this machine; none if the machine cannot have it."""
+        """The components of the effect on this machine; none if the machine cannot have it."""
 
 
 @frozen
 class PhysicalEffect:
     """A physical effect of one machine.
 
-    largest      (mm or rad, over the travel) what would be much; NaN if nobody says
-    instruments  kinds of measurement that see it
-    needs        state columns without which it cannot be seen
+    effects      its components
+    largest      size over the travel that would be large, mm or rad; NaN if not known
+    instruments  kinds of measurement in which it is visible
+    needs        state columns that a measurement must have for it
     """
 
     name: str
@@ -69,7 +70,7 @@ SEEN = ("tcp", "tcp6", "probe", "length")
 
 
 def library(machine: Machine) -> dict[str, PhysicalEffect]:
-    """Every physical effect that this machine can have, by name; those of plugins too."""
+    """Name -> physical effect, for all that this machine can have, including those of plugins."""
     found = [each for axis in machine.axes for each in _of_axis(axis)]
     found += [each for pair in _carried(machine) for each in _dead_weight(*pair)]
     found += [each for axis in machine.axes for each in _of_joint(machine, axis)]
@@ -86,7 +87,7 @@ def library(machine: Machine) -> dict[str, PhysicalEffect]:
 
 @lru_cache(maxsize=1)
 def kinds() -> dict[str, type[Basis]]:
-    """Every basis by its name: the built-in ones and those of plugins."""
+    """Name -> basis, for the built-in ones and those of plugins."""
     return registry("bases", {basis.name: basis for basis in (*SMOOTH, *PIECEWISE)})
 
 
@@ -127,7 +128,10 @@ def _of_axis(axis: Axis) -> Iterator[PhysicalEffect]:
 
 
 def _dead_weight(own: Axis, carried: Axis) -> Iterator[PhysicalEffect]:
-    """f(own) times the position of what it carries: the part that is not of either axis alone."""
+    """Tilts of axis `own` by the weight of axis `carried`: f(own) times the position of `carried`.
+
+    Terms of one of the two axes alone are not included.
+    """
     center, scale = _span(own)
     middle, half = _span(carried)
     basis = Polynomial(degree=(1, 2))
@@ -160,7 +164,7 @@ def _of_spindle(machine: Machine) -> Iterator[PhysicalEffect]:
 
 
 def _of_joint(machine: Machine, axis: Axis) -> Iterator[PhysicalEffect]:
-    """A gear that yields under the weight of an arm: the torque goes with the sine and cosine of how links lean."""
+    """The yielding of a joint's gear under the weight of an arm: proportional to sine and cosine of the links' lean."""
     component, signals = _along(axis), leaning(machine.axes, axis)
     if component is None or not signals:
         return
@@ -175,8 +179,8 @@ def yielding(name: str, axis: Axis, signal: str) -> Effect:
 
 
 def leaning(axes: tuple[Axis, ...], axis: Axis) -> tuple[str, ...]:
-    """How the links lean whose weight a joint of an arm bears: sums of the angles of joints that turn about one
-    direction, one behind the other (B, B+C). None of other joints: what turns them is no lean.
+    """The signals of the lean of the links whose weight a joint of an arm bears: sums of the angles of consecutive
+    joints with parallel axes (B, B+C). Empty for other joints, whose rotation changes no lean.
     """
     if not is_arm(axes) or not axis.rotary:
         return ()
@@ -193,14 +197,17 @@ def leaning(axes: tuple[Axis, ...], axis: Axis) -> tuple[str, ...]:
 
 
 def _carried(machine: Machine) -> Iterator[tuple[Axis, Axis]]:
-    """Pairs of linear axes of one branch: one, and one that it carries."""
+    """Pairs of linear axes of one branch: an axis, and one that it carries."""
     for held in (True, False):
         branch = [axis for axis in machine.axes if axis.workpiece_side == held and not axis.rotary]
         yield from combinations(branch[::-1] if held else branch, 2)
 
 
 def runs_ahead(axis: Axis, effect: Effect) -> bool:
-    """Whether a body is ahead of its axis on both ways. Lost motion leaves it behind, on either side of the chain."""
+    """Whether an effect is a play with the wrong sign: the body would be ahead of its axis in both directions.
+
+    Lost motion leaves the body behind, on either side of the chain.
+    """
     component = _along(axis)
     if component is None or effect.name != f"E{component}{axis.name}" or not isinstance(effect.basis, Backlash):
         return False
@@ -210,27 +217,27 @@ def runs_ahead(axis: Axis, effect: Effect) -> bool:
 
 
 def _along(axis: Axis) -> str | None:
-    """The component along or about the axis itself; None if it is none of its error axes."""
+    """The letter of the component along or about the axis itself; None if the axis is along none of its error axes."""
     shares = np.abs(np.asarray(axis.error_axes) @ np.asarray(axis.direction))
     index = int(shares.argmax())
     return ("ABC" if axis.rotary else "XYZ")[index] if shares[index] > 1 - 1e-9 else None
 
 
 def _span(axis: Axis) -> tuple[float, float]:
-    """Centre and half of the travel, in the file's unit."""
+    """Centre and half of the travel, in the unit of the machine file; (0, 180 degrees or 100 mm) without limits."""
     low, high = (limit / axis.unit for limit in axis.range)
     bounded = bool(np.isfinite([low, high]).all())
     return ((low + high) / 2, (high - low) / 2) if bounded else (0.0, 180.0 if axis.rotary else 100.0)
 
 
 SAMPLES = 361
-"""Positions looked at along an axis."""
+"""Number of sampled positions along an axis."""
 
 
 def extent(machine: Machine, effect: Effect) -> tuple[float, float] | None:
     """Lowest and highest value of an effect over the travel, mm or rad.
 
-    None where that has no answer: it depends on a signal that is no axis, or on an axis without a range.
+    None if it depends on a signal that is no axis, or on an axis without a range.
     """
     axes = _axes_of(machine, effect)
     if None in axes:
@@ -247,9 +254,9 @@ def extent(machine: Machine, effect: Effect) -> tuple[float, float] | None:
 
 
 def at_the_ends(machine: Machine, effect: Effect) -> Array:
-    """Values of an effect with all axes at their lowest and at their highest positions, mm or rad.
+    """(2,) values of an effect with all axes at their lowest, and at their highest, positions, mm or rad.
 
-    None of them where it depends on a signal that is no axis.
+    Empty if it depends on a signal that is no axis.
     """
     if None in _axes_of(machine, effect):
         return np.empty(0)
@@ -268,15 +275,15 @@ def _values(machine: Machine, effect: Effect, q: Array, direction: int) -> Array
 
 
 def functions_at(machine: Machine, effect: Effect, q: Array, state: State, inputs: Iterable[str] = ()) -> Array:
-    """The functions of an effect (k, n) at positions (n, n_axes), if it depends on no other `inputs` than these."""
+    """(k, n) the functions of an effect at positions q (n, n_axes); `inputs`: the state inputs that it may have."""
     _, poses = flatten(q, state, machine.axes, frozenset(inputs))
     return dependence_of(machine.axes, effect).rows(poses)
 
 
 def at_inputs(machine: Machine, inputs: Mapping[str, float]) -> Machine:
-    """The machine while inputs such as temperatures stay at these values: effects no longer depend on them.
+    """The machine with inputs such as temperatures fixed at these values: its effects no longer depend on them.
 
-    Lags are over. Inputs that the machine does not have do nothing; effects that depend on others stay as they are.
+    Lags are taken as settled. Inputs that the machine does not have are ignored; effects of other inputs stay.
     """
     if machine.inputs.isdisjoint(inputs):
         return machine
@@ -306,19 +313,19 @@ def _at_inputs(effect: Effect, inputs: Mapping[str, float]) -> Effect:
 
 
 def _of_times(effect: Effect) -> tuple[float, float]:
-    """Centre and scale of the second signal."""
+    """Centre and scale of the second signal, `times`."""
     center = effect.center if effect.times_center is None else effect.times_center
     return center, effect.scale if effect.times_scale is None else effect.times_scale
 
 
 def with_unit(machine: Machine, name: str) -> str:
-    """The name of an axis with the unit of its positions; that of a signal as it is."""
+    """The name of an axis with the unit of its positions; the name of any other signal unchanged."""
     units = {axis.name: "degree" if axis.rotary else "mm" for axis in machine.axes}
     return f"{name}, {units[name]}" if name in units else name
 
 
 def travel(machine: Machine, axis: int) -> Array:
-    """(n,) positions of an axis over its travel, with its kinks, mm or rad; NaN if it has no end."""
+    """(n,) positions of an axis over its travel, including its kinks, mm or rad; NaN without limits."""
     low, high = (0.0, 2 * np.pi) if machine.axes[axis].endless else machine.ranges[axis]
     kinks = machine.breakpoints(machine.axis_names[axis])
     inside = kinks[(kinks >= low) & (kinks <= high)]
@@ -326,12 +333,12 @@ def travel(machine: Machine, axis: int) -> Array:
 
 
 def vector(values: Sequence[float]) -> str:
-    """Three numbers for people."""
+    """Three numbers as text."""
     return f"({', '.join(f'{value:.6g}' for value in values)})"
 
 
 def facts(machine: Machine) -> dict[str, str]:
-    """What a machine file says besides chain and errors."""
+    """The settings and provenance of a machine file as text, by name."""
     sizes = {"least increment": machine.least_increment, "largest correction": machine.max_correction}
     rows = {"topology": machine.topology, "control": machine.control or ""}
     rows |= {name: f"{linear:g} mm, {np.degrees(rotary):g} deg" for name, (linear, rotary) in sizes.items()}
@@ -341,31 +348,31 @@ def facts(machine: Machine) -> dict[str, str]:
 
 
 def travel_of(axis: Axis) -> str:
-    """The range of an axis for people."""
+    """The range of an axis as text, with its unit."""
     low, high = (limit / axis.unit for limit in axis.range)
     return f"{low:g} ... {high:g} {'deg' if axis.rotary else 'mm'}" if np.isfinite(high - low) else "no limits"
 
 
 def title_of(machine: Machine, effect: Effect) -> str:
-    """What an effect is."""
+    """The title of an effect, e.g. "straightness of X in Y"."""
     return component_title(effect.name, machine.axis(effect.joint))
 
 
 def depends_on(effect: Effect) -> str:
-    """What an effect is a function of, for people."""
+    """The basis and the signals of an effect as text, e.g. "polynomial of X"."""
     signals = [signal for signal in (effect.signal, effect.times) if signal is not None]
     return f"{effect.basis.name} of {', '.join(signals)}" if signals else "constant"
 
 
 @frozen
 class EffectCurve:
-    """An effect over the axis that it depends on.
+    """An effect over the axis on which it depends.
 
-    axis       the axis
+    axis       letter of the axis
     x          (n,) positions, mm or degree
-    value      (n,) mm or rad
+    value      (n,) value of the effect, mm or rad
     sigma      (n,) standard deviation by the effect's covariance, mm or rad; None if it has none
-    direction  of approach: 1 or -1, 0 where that does not matter
+    direction  direction of approach: 1 or -1; 0 if the effect does not depend on it
     """
 
     axis: str
@@ -377,7 +384,7 @@ class EffectCurve:
 
 @frozen
 class TipCurve:
-    """How the error of the tool tip changes as one axis moves over its travel, the others in the middle of theirs.
+    """The error of the tool tip along the travel of one axis, with the other axes in the middle of their travel.
 
     x      (n,) positions, mm or degree
     error  (n, 3) actual minus nominal position of the tip, workpiece frame, mm
@@ -389,9 +396,9 @@ class TipCurve:
 
 
 def effect_curves(machine: Machine, effect: Effect) -> list[EffectCurve]:
-    """An effect over its travel, once for each direction of approach if that matters.
+    """The curve of an effect over the travel of its axis; two curves if it depends on the direction of approach.
 
-    Empty if it depends on no axis, on two things at once, or on an axis without a range.
+    Empty if it depends on no axis, on two signals, or on an axis without a range.
     """
     match _axes_of(machine, effect):
         case [int(axis)] if (q := _moved(machine, axis)) is not None:
@@ -401,7 +408,7 @@ def effect_curves(machine: Machine, effect: Effect) -> list[EffectCurve]:
 
 
 def rest_of(machine: Machine) -> dict[str, float]:
-    """For each input the value at which its effects are zero: the `center` of the first that has it."""
+    """Input -> the value at which its effects are zero: the `center` of the first effect of this input."""
     found: dict[str, float] = {}
     for effect in machine.effects:
         for name, value in ((effect.times, _of_times(effect)[0]), (effect.input, effect.center)):
@@ -411,7 +418,7 @@ def rest_of(machine: Machine) -> dict[str, float]:
 
 
 def tip_curves(machine: Machine, tool_length: float = 0.0) -> list[TipCurve]:
-    """The error of the tip along each axis; of approach from below, and with all inputs at rest."""
+    """The curves of the tip error along each axis, approached from below, with all inputs as in `rest_of`."""
     found = []
     inputs = rest_of(machine)
     for index, axis in enumerate(machine.axes):
@@ -433,7 +440,7 @@ def _curve(machine: Machine, effect: Effect, q: Array, axis: int, direction: int
 
 
 def _moved(machine: Machine, axis: int) -> Array | None:
-    """(n, n_axes): one axis over its travel, in order, the others in the middle of theirs; None without a range."""
+    """(n, n_axes) positions: one axis over its travel, in order, the others in their middle; None without a range."""
     x = travel(machine, axis)
     if not np.isfinite(x).all():
         return None
@@ -446,19 +453,18 @@ def _moved(machine: Machine, axis: int) -> Array | None:
 UM, URAD = 1e3, 1e6
 METRE = 1000.0
 COUNTED = {"time_s": ("h", 3600.0), "load_kg": ("kg", 1.0), "load_kgm": ("kg m", 1.0), "tool_length": ("m", METRE)}
-"""Signals that are no positions: unit, and how much of the signal it is."""
+"""Signal that is no position -> its unit, and the amount of the signal that this unit is."""
 KELVIN = ("K", 1.0)
 
 Unit = tuple[float, str]
-"""What mm or rad is multiplied with, and the name of what comes out."""
+"""(factor from mm or rad, name of the unit)."""
 
 
 def units(machine: Machine, effect: Effect) -> tuple[Unit, ...]:
-    """The units that people use for the coefficients of an effect: a gain in um/m, growth in um/K, play in um.
+    """The customary units of the coefficients of an effect: a gain in um/m, growth in um/K, play in um.
 
-    A coefficient belongs to a power of u = (x - center) / scale. Where u is a share of an axis' travel it is said as it
-    stands, um at u = 1: the end of the travel. Where u counts mm, degrees, kelvins, hours or kilograms the unit says
-    so.
+    A coefficient belongs to a power of u = (x - center) / scale. If u is a share of the travel of an axis, the unit is
+    um, at u = 1, the end of the travel. If u counts mm, degrees, kelvins, hours or kilograms, the unit includes it.
     """
     size, name = (URAD, "urad") if effect.rotational else (UM, "um")
     factor, times = _per(machine, effect.times, effect.times_scale or effect.scale)
@@ -474,7 +480,7 @@ def units(machine: Machine, effect: Effect) -> tuple[Unit, ...]:
 
 
 def _per(machine: Machine, signal: str | None, scale: float) -> Unit:
-    """From "per u" to "per unit of the signal"; no unit where u is a share of a travel, or of who knows what."""
+    """Factor and unit from "per u" to "per unit of the signal"; no unit if u is a share of a travel, or not known."""
     unit, size = "", 1.0
     if signal in machine.axis_names:
         if np.isclose(scale, 1.0):

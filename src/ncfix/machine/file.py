@@ -1,8 +1,8 @@
-"""Machine files: TOML to `Machine`, with every fault of the file named at once.
+"""Machine files: TOML to `Machine`, with all faults of the file reported at once.
 
-docs/formats.md describes the file. Millimetres and degrees there are mm and rad here. An [[effect]] has the name of an
-ISO 230-1 component, or that of a physical effect (`backlash-X`, `spindle-growth`, a plugin's), which stands for
-components, bases and inputs: the file gives the coefficients of all of its components in turn.
+docs/formats.md describes the file. Degrees in the file are rad in `Machine`. An [[effect]] has the name of an ISO 230-1
+component, or of a physical effect (`backlash-X`, `spindle-growth`, one of a plugin), which stands for components, bases
+and inputs: then the file gives the coefficients of all of its components in turn.
 """
 
 from __future__ import annotations
@@ -46,20 +46,20 @@ from ncfix.toml_text import Report, TomlTable, decoded, did_you_mean, key_lines,
 
 SCHEMA = 1
 TOP = ("ncfix", "name", "topology", "control", "least_increment", "max_correction", "workpiece_offset")
-"""Keys that stand above the tables."""
+"""Keys above the tables."""
 SETUP = {"work_offsets", "tools", "initial", "references", "variables"}
 """Tables that only a setup file has."""
 EXACT = 1e-14
-"""A vector this near to unit length is left as it is written."""
+"""Deviation from unit length below which a vector is kept as written."""
 TILTED = 1e-6
-"""Error axes that are this far from orthonormal are a mistake."""
+"""Deviation of error axes from an orthonormal triad above which they are refused."""
 INPUT = re.compile(r"[a-z][a-z0-9_]*")
 SMALLEST_SCALE = 1e-9
-"""In the unit of what is scaled: mm, degree, K, s."""
+"""Smallest scale, in the unit of the scaled signal: mm, degree, K, s."""
 
 
 def load(path: str | Path) -> Machine:
-    """The machine that a file describes. Raises `ConfigError` with every fault found (NCF300 to NCF319)."""
+    """The machine of a machine file. Raises `ConfigError` with all faults found (NCF300 to NCF319)."""
     try:
         source = taken(os.fspath(path), MOST_SAID)
     except OSError as error:
@@ -69,7 +69,7 @@ def load(path: str | Path) -> Machine:
 
 
 def loads(source: str | bytes, path: str = "<machine>") -> Machine:
-    """The machine that a text describes. Raises `ConfigError` with every fault found; `path` is for messages."""
+    """The machine of the text of a machine file. Raises `ConfigError` with all faults found; `path` is for messages."""
     text = source if isinstance(source, str) else decoded(source, path, "NCF301")
     values = parsed(text, path, "NCF301", "docs/formats.md shows a machine file")
     if "topology" not in values and SETUP & values.keys():
@@ -99,7 +99,7 @@ def _machine(root: TomlTable) -> Machine | None:
         section.close()
 
     def physical() -> Mapping[str, PhysicalEffect]:
-        """Those that this machine can have; none if it cannot be built yet."""
+        """The physical effects that this machine can have; none if its axes are incomplete."""
         if order is None or any(letter not in axes for letter in order.axes):
             return {}
         return library(Machine("", str(order), tuple(axes[letter] for letter in order.axes), tool))
@@ -117,7 +117,7 @@ def _machine(root: TomlTable) -> Machine | None:
     columns, effects = tuple(axes[letter] for letter in order.axes), tuple(effect for each in found for effect in each)
     notes = dict(provenance.values) if provenance else {}
     machine = Machine(name, str(order), columns, tool, effects, control, increment, correction, offset, notes)
-    for index, each in enumerate(found):  # no machine has effects that are not finite, no arithmetic survives them
+    for index, each in enumerate(found):  # an effect that is not finite would spoil all arithmetic
         with np.errstate(all="ignore"):
             finite = [np.isfinite(at_the_ends(machine, effect)).all() for effect in each]
         if not all(finite):
@@ -127,7 +127,7 @@ def _machine(root: TomlTable) -> Machine | None:
 
 
 def _axes(root: TomlTable, order: Topology | None) -> dict[str, Axis]:
-    """The axes by letter; those that the topology and the tables do not both name are noted."""
+    """Letter -> axis. Axes that only the topology, or only the tables, name are reported (NCF307)."""
     tables = root.table("axis", required=True)
     if tables is None:
         return {}
@@ -213,9 +213,9 @@ def _effects(
     axes: Mapping[str, Axis],
     physical: Callable[[], Mapping[str, PhysicalEffect]],
 ) -> tuple[Effect, ...]:
-    """The effects that a table stands for: one of an ISO 230-1 component, those of a physical effect by its name.
+    """The effects of an [[effect]] table: one ISO 230-1 component, or all components of a physical effect.
 
-    Nothing if something is wrong (then it is noted).
+    Empty if the table has a fault, which is then reported.
     """
     before = len(section.report.messages)
     name = section.values.get("name")
@@ -289,7 +289,7 @@ def _basis(section: TomlTable, kind: type[Basis]) -> Basis | None:
 
 
 def _parameter(section: TomlTable, parameter: Field[Any]) -> Any:
-    """The value of a basis parameter; its default if it is not there; None if it is wrong."""
+    """The value of a basis parameter; its default if it is not given; None if it is invalid."""
     if not section.has(parameter.name) and not parameter.metadata["required"]:
         return parameter.default
     readers: dict[str, Callable[..., Any]] = {
@@ -351,7 +351,7 @@ def _covariance(section: TomlTable, size: int) -> Matrix | None:
 
 
 def _check_fit(section: TomlTable, effect: Effect, axes: Mapping[str, Axis]) -> None:
-    """Note what this basis and these options cannot do for this component."""
+    """Report combinations of basis, options and component that are impossible (NCF315)."""
 
     def note(key: str, text: str, hint: str = "") -> None:
         section.note("NCF315", key if key in section.values else "name", text, hint)
@@ -375,7 +375,7 @@ def _check_fit(section: TomlTable, effect: Effect, axes: Mapping[str, Axis]) -> 
 
 
 def _of_physical(section: TomlTable, named: PhysicalEffect) -> tuple[Effect, ...]:
-    """The effects that a physical effect is made of; nothing if something is wrong (then it is noted)."""
+    """The components of a physical effect with the coefficients of the table; empty if it has a reported fault."""
     before = len(section.report.messages)
     section.text("name")
     values = section.numbers("coefficients", required=True)

@@ -1,9 +1,9 @@
-"""Bases that are given piece by piece: table, spline, step, truncated powers.
+"""Piecewise bases: table, spline, step, truncated powers.
 
 Outside the first and last place of a table, spline or step the end values hold.
 """
 
-# What the methods mean is said once, in `Basis`.
+# The methods are documented in `Basis`.
 # ruff: noqa: D102
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from ncfix.values import frozen
 
 
 def splines(knots: Array, degree: int, coefficients: Array, u: Array) -> Array:
-    """Sums of B-splines with coefficients (m, k) at u (...), all within the range of the knots: (m, ...).
+    """(m, ...) sums of B-splines with coefficients (m, k) at u (...), all within the range of the knots.
 
-    By de Boor's algorithm (A Practical Guide to Splines, chapter X). A library could do it, too; importing one takes
+    By de Boor's algorithm (A Practical Guide to Splines, chapter X). No library is used, because importing one takes
     longer than correcting a short program.
     """
     cell = np.clip(np.searchsorted(knots, u, side="right") - 1, degree, coefficients.shape[1] - 1)
@@ -37,12 +37,12 @@ def splines(knots: Array, degree: int, coefficients: Array, u: Array) -> Array:
 
 
 def spline_slopes(knots: Array, degree: int, coefficients: Array, u: Array) -> Array:
-    """Their derivatives by u, as `splines`: splines of a degree less."""
+    """(m, ...) the derivatives by u of the sums of `splines`: splines of one degree less."""
     return splines(knots[1:-1], degree - 1, spline_rates(knots, degree, coefficients), u)
 
 
 def spline_rates(knots: Array, degree: int, coefficients: Array) -> Array:
-    """The coefficients (m, k - 1) of the derivatives of splines (m, k), on the knots but the first and the last."""
+    """(m, k - 1) the coefficients of the derivatives of splines (m, k), on the knots without the first and the last."""
     width = knots[degree + 1 : -1] - knots[1 : -degree - 1]
     rise = degree * np.diff(coefficients, axis=1)
     return np.where(width > 0, rise / np.where(width > 0, width, 1.0), 0.0)
@@ -53,20 +53,20 @@ ONE_WAY = "both, positive or negative: acts for this direction of motion only"
 
 
 def share_of(way: str, direction: Array) -> Array | float:
-    """How much of what acts `way` there is for directions of motion (-1, 0, 1); half where they are not known."""
+    """Weight of an effect that acts in direction `way` for directions of motion (-1, 0, 1): 0 or 1, 0.5 if unknown."""
     if way == BOTH:
         return 1.0
     return 0.5 * (1 + (1.0 if way == POSITIVE else -1.0) * direction)
 
 
 def no_way(way: str) -> list[tuple[str, str]]:
-    """A complaint about a word that is no way."""
+    """The complaint about an invalid direction; none for a valid one."""
     return [] if way in (BOTH, POSITIVE, NEGATIVE) else [("direction", f"{way!r} is none of both, positive, negative")]
 
 
 @frozen
 class PiecewiseLinear(Basis):
-    """Values at given positions, straight lines between them: what a control's own table holds."""
+    """Values at given positions with straight lines between them, as in a control's own table."""
 
     positions: tuple[float, ...] = key("numbers", "where the values stand, ascending")
     direction: str = key("text", ONE_WAY, BOTH)
@@ -154,7 +154,7 @@ class Spline(Basis):
         return float(steps[steps > 0].min())
 
     def bounds(self, coefficients: tuple[float, ...], low: float, high: float) -> tuple[float, float, float] | None:
-        """By the coefficients of the spline and of its derivatives, between which their values lie."""
+        """See `Basis.bounds`: the values of a spline and of its derivatives lie between their coefficients."""
         found, knots, values = [], np.asarray(self.knots), np.asarray(coefficients)[None]
         for degree in range(self.degree, self.degree - 3, -1):
             found.append(float(np.abs(values).max()) if degree >= 0 else 0.0)
@@ -230,7 +230,7 @@ class PiecewiseConstant(Basis):
 
 
 def ascending(name: str, values: tuple[float, ...], strictly: bool = True) -> list[tuple[str, str]]:
-    """A complaint if the values do not ascend."""
+    """The complaint about values that do not ascend; none if they do."""
     steps = np.diff(values)
     bad = np.flatnonzero(steps <= 0 if strictly else steps < 0)
     if not bad.size:
@@ -240,18 +240,18 @@ def ascending(name: str, values: tuple[float, ...], strictly: bool = True) -> li
 
 
 def _at(index: Any, values: Array | float, size: int) -> Array:
-    """Rows that are zero but for `values` in row `index`."""
+    """(size, ...) rows that are zero except for `values` in row `index`."""
     return np.where(columns_like(range(size), index) == index, values, 0.0)
 
 
 @frozen
 class Truncated(Basis):
-    """Powers of u, and for each knot t the power of u - t above it: degree 2 is once smooth, 3 twice (Soons, Eq. 3.2).
+    """Powers of u, and for each knot t a power of u - t above t: degree 2 is smooth once, 3 twice (Soons, Eq. 3.2).
 
-    A coefficient belongs to each knot, so that knots can be chosen.
+    Each knot has a coefficient of its own, so that knots can be selected.
 
-    With `detrended` each function has no mean and no slope between these ends, by least squares over all of it: what
-    straightness must not have, since that is squareness (J. A. Soons, TU Eindhoven 1993, Eq. 3.8).
+    With `detrended`, no function has a mean or slope between these ends, by least squares: straightness must have none,
+    because its slope is squareness (J. A. Soons, TU Eindhoven 1993, Eq. 3.8).
     """
 
     knots: tuple[float, ...] = key("numbers", "where the pieces meet, ascending")
@@ -303,7 +303,7 @@ class Truncated(Basis):
         return found - columns_like(self._trend()[:, 1], u) if self.detrended else found
 
     def without_knots(self, keep: Mask) -> Self:
-        """The basis with some of its functions only."""
+        """The basis with the functions `keep` (k,) only."""
         own = len(self.powers)
         return replace(
             self,
@@ -312,7 +312,7 @@ class Truncated(Basis):
         )
 
     def _above(self, u: Array) -> Array:
-        """How far u is above each knot, (k, ...); zero below it."""
+        """(k, ...) u minus each knot; zero below the knot."""
         return np.maximum(u - columns_like(self.knots, u), 0.0)
 
     def _trend(self) -> Array:

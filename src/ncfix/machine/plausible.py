@@ -1,10 +1,9 @@
-"""Is a well-formed machine one that there is? Sizes against those of real machines, units likely meant, axes that span.
+"""Plausibility of a well-formed machine: sizes against those of real machines, likely units, axes that span space.
 
-What is *much* for an error component says `axes.large_size`, for a machine of a metre. Errors along an axis
-grow with its travel, where an axis lies is known the less the further one must reach, and arms of rotary joints err ten
-times as much as machines with slides: their users speak of tenths of a millimetre and more where those of machining
-centres speak of hundredths. So `much` here scales with travel, reach and the kind of chain; it never is less than on a
-machine of a metre.
+The size that is *much* for an error component is `axes.large_size`, for a machine of one metre. Errors along an axis
+grow with its travel; location errors grow with the size of the machine; and arms of rotary joints have ten times the
+errors of machines with slides: tenths of a millimetre rather than hundredths. So `much` scales with travel, reach and
+the kind of chain; it is never less than for a machine of one metre.
 """
 
 from __future__ import annotations
@@ -27,55 +26,55 @@ from ncfix.toml_text import decoded, key_lines, line_of, parsed, place_of
 from ncfix.values import frozen
 
 BEYOND = 10.0
-"""Times what is much: no machine that runs is so wrong."""
+"""Largest possible error, as a multiple of `much`."""
 METRE = 1000.0
-"""mm: the machine for which the catalogue says what is much."""
+"""Size, mm, of the machine to which `large_size` refers."""
 ARM = 10.0
-"""How much more an arm errs."""
+"""Factor of the errors of an arm over those of a machine with slides."""
 UNLIMITED_MM = 100.0
-"""Half the travel that is taken for a linear axis without a range."""
+"""Assumed half travel of a linear axis without a range, mm."""
 PLANE = 0.05
-"""Least singular value of the directions of X Y Z: axes within some 3 degrees of one plane, or of one line."""
+"""Least singular value of the directions of X Y Z; below it, they are within some 3 degrees of one plane or line."""
 SAME, SAME_MM = 1e-6, 1e-3
-"""Axis lines that differ by less are one."""
+"""Differences of direction, and of place, mm, below which two axis lines are one."""
 LEAST_TRAVEL, MOST_TRAVEL = 1.0, 200_000.0
-"""mm: travels that no axis has; a metre written as 1 is among the first, a metre in um among the second."""
+"""Smallest and largest possible travel, mm. A travel below is probably in metres, one above in um."""
 PITCHES = (0.1, 2000.0)
-"""mm: no screw and no rack has a pitch beyond these."""
+"""Smallest and largest possible pitch of a screw or rack, mm."""
 COARSEST = (0.1, 1.0)
-"""mm and degree: no control counts in coarser steps."""
+"""Largest possible least increment, mm and degree."""
 MOST_CORRECTION = (50.0, 10.0)
-"""mm and degree: who allows corrections of this size has meant another unit."""
+"""Largest possible `max_correction`, mm and degree; a larger value is in another unit."""
 INCH = 25.4
 SMALL_TRAVEL = 42.0
-"""mm; where no linear axis goes farther, travels may be in inches."""
+"""Travel, mm, up to which the travels of all linear axes may be in inches."""
 NEARLY = 0.02
-"""Of the travel: so near to its ends do positions in another unit begin and end."""
+"""Largest distance of positions in another unit from the ends of the travel, as a share of it."""
 CORNER = 1 / 300
-"""Of the travel: a table that covers less is in another unit."""
+"""Least share of the travel that a table covers; one that covers less is in another unit."""
 TURN_RAD = 2 * np.pi + 0.01
 UNITS = {
     False: (("um", 1e-3),),
     True: (("degrees", np.pi / 180), ("seconds of arc", np.pi / 648000), ("urad", 1e-6)),
 }
-"""By whether it is an angle: in what it may have been written, and mm or rad per that."""
+"""Whether it is an angle -> units in which it may have been written, with their size in mm or rad."""
 LEAST = 1e-3
-"""Of what is much: nobody writes down less, so no unit was meant that makes it of a number."""
+"""Least share of `much` of a value that was meant: units that make less of a number are not suggested."""
 
 
 @frozen
 class Doubt:
-    """What is odd about a machine, and whether it is more than odd: no machine is so."""
+    """An implausible property of a machine; `impossible`: no real machine has it."""
 
     message: Message
     impossible: bool
 
 
 def doubts(machine: Machine, path: str, lines: bool = False) -> list[Doubt]:
-    """All that machines do not have or hardly have: NCF320 to NCF323, NCF325.
+    """All implausible properties of a machine: NCF320 to NCF323, NCF325.
 
-    path   that of its file
-    lines  the file is looked up for where in it things stand
+    path   path of its file
+    lines  read the file again for the lines of the messages
     """
     found = [*_sizes(machine), *_span(machine), *_travels(machine), *_settings(machine), *_positions(machine)]
     places = _places(path) if found and lines else lambda keys: Place(path)
@@ -83,9 +82,10 @@ def doubts(machine: Machine, path: str, lines: bool = False) -> list[Doubt]:
 
 
 def _places(path: str) -> Callable[[Sequence[str]], Place]:
-    """Where keys of a machine file stand: `axis.X.range`, or of the first effect of a name `effect.EXX.positions`.
+    """A function from keys to their place in a machine file: (axis, X, range), or (effect, EXX, positions).
 
-    Of what is no file that can be read again (standard input, a pipe), its name.
+    For several effects of a name, the first is meant. A file that cannot be read again (standard input, a pipe) has
+    places without lines.
     """
     try:
         text = decoded(Path(path).read_bytes(), path, "NCF301") if Path(path).is_file() else ""
@@ -105,9 +105,9 @@ def _places(path: str) -> Callable[[Sequence[str]], Place]:
 
 
 def required(machine: Machine, path: str, accepted: str) -> list[Message]:
-    """What is merely odd about a machine that something shall be made with.
+    """The messages about implausible but possible properties of a machine that is to be used.
 
-    Raises `RefusedError` with all that cannot be; `accepted` says how the user can have it all the same.
+    Raises `RefusedError` with all impossible ones; `accepted`: words that say how the user can use it all the same.
     """
     found = doubts(machine, path)
     if any(each.impossible for each in found):
@@ -118,17 +118,14 @@ def required(machine: Machine, path: str, accepted: str) -> list[Message]:
 
 
 Fault = tuple[str, str, str, bool, *tuple[str, ...]]
-"""Code, text, hint, whether it cannot be, and the keys of the file that it is about."""
+"""(code, text, hint, whether it is impossible, keys of the machine file...)."""
 
 
 # -- sizes -------------------------------------------------------------------------------------------------------------
 
 
 def much(machine: Machine, name: str) -> float:
-    """What is much of an error component on this machine, mm or rad.
-
-    Rotary joints in a row that carry the tool or the workpiece, as in a robot, make an arm.
-    """
+    """The size that is much for an error component on this machine, mm or rad; see the module's docstring."""
     location, axis = len(name) == 4, machine.axis(name[-1])
     size = float(large_size(name)) * (ARM if is_arm(machine.axes) else 1.0)
     if axis is not None and not axis.rotary and not location:
@@ -137,13 +134,13 @@ def much(machine: Machine, name: str) -> float:
 
 
 def times_a_machining_centre(machine: Machine) -> float:
-    """How many times as large errors are as those of a machining centre of a metre: 1, 2, 4 ..."""
+    """Factor of usual errors over those of a machining centre of one metre: a power of 2."""
     size = (ARM if is_arm(machine.axes) else 1.0) * max(1.0, reach(machine) / METRE)
     return float(2.0 ** np.round(np.log2(size)))
 
 
 def reach(machine: Machine) -> float:
-    """How large a machine is, mm: the diagonal of its travels and the way over its axis points."""
+    """The size of a machine, mm: the diagonal of its travels plus the way over its axis points."""
     travels = [_travel_mm(axis) for axis in machine.axes if not axis.rotary]
     points = [np.asarray(axis.point) for axis in machine.axes if axis.rotary] + [np.asarray(machine.tool.point)]
     way = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(points))
@@ -156,8 +153,8 @@ def _travel_mm(axis: Axis) -> float:
 
 
 def functions(machine: Machine, effect: Effect) -> Array:
-    """The functions of an effect over what they depend on, (k, n): over the travels of axes, signals one scale about
-    their centre, after a long time where they act late.
+    """(k, n) the functions of an effect over the range of its signals: over the travels of axes, and from one scale
+    below to one above the centre of other signals. Lags are taken as settled.
     """
     effect = replace(effect, time_constant_s=None)
     signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
@@ -177,7 +174,7 @@ def functions(machine: Machine, effect: Effect) -> Array:
 
 
 def _sizes(machine: Machine) -> Iterator[Fault]:
-    """Errors that are much, by name; those that depend on the same and on nothing but one axis add up."""
+    """Error components that are larger than `much`. Effects of one name that depend on one axis only are added up."""
     groups: dict[str, dict[object, list[Effect]]] = {}
     for index, effect in enumerate(machine.effects):
         signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
@@ -203,7 +200,7 @@ def _sizes(machine: Machine) -> Iterator[Fault]:
 
 
 def _largest(machine: Machine, effects: Sequence[Effect]) -> float:
-    """The largest size of the sum, mm or rad; of functions at places of their own the sum of the sizes is taken."""
+    """The largest size of the sum of effects, mm or rad; of effects with different samples, the sum of the sizes."""
     values = [np.asarray(effect.coefficients) @ functions(machine, effect) for effect in effects]
     if len({each.shape for each in values}) > 1:
         values = [np.abs(each).max(keepdims=True) for each in values]
@@ -211,7 +208,7 @@ def _largest(machine: Machine, effects: Sequence[Effect]) -> float:
 
 
 def sized(value: float, angle: bool) -> str:
-    """A length or an angle for people."""
+    """A length or an angle as text, with a suitable unit."""
     if angle:
         return f"{value:.4g} rad" if value >= 1e-2 else f"{1e6 * value:.4g} urad"
     return f"{value:.4g} mm" if value >= 1 else f"{1e3 * value:.4g} um"
@@ -224,7 +221,7 @@ LEFT_HAND = "of an axis below the workpiece `direction` says how its body moves:
 
 
 def _span(machine: Machine) -> Iterator[Fault]:
-    """Axes of which one does what others do. U V W and further axes may be parallel to X Y Z."""
+    """Axes that do not span space, or are left-handed. U V W and further axes may be parallel to X Y Z."""
     linear = [axis for axis in machine.axes if not axis.rotary and axis.name in "XYZ"]
     directions = np.array([axis.direction for axis in linear]).reshape(-1, 3)
     if len(linear) > 1 and np.linalg.svd(directions, compute_uv=False).min() < PLANE:
@@ -276,7 +273,7 @@ def _travels(machine: Machine) -> Iterator[Fault]:
 
 
 def _inches(places: Array, low: float, high: float) -> str:
-    """What to ask where positions and the travel that they cover are in two units; "" where they are not."""
+    """The question to the user if positions or the travel seem to be in inches, one of the two; else ""."""
     ends, close = places[[0, -1]], NEARLY * (high - low)
     if np.abs(INCH * ends - (low, high)).max() < close:
         return "are the positions in inches? All lengths are in mm"
@@ -285,7 +282,7 @@ def _inches(places: Array, low: float, high: float) -> str:
 
 
 def _radians(limits: tuple[float, float]) -> bool:
-    """Whether ends of a range are round in radians, and not in degrees."""
+    """Whether the ends of a range look like radians: not round as written, but multiples of 5 degrees if converted."""
     parts = np.array([limit for limit in limits if limit])
     uneven = np.abs(parts - np.round(parts, 1)) > 1e-6
     steps = np.degrees(parts) / 5
@@ -293,7 +290,7 @@ def _radians(limits: tuple[float, float]) -> bool:
 
 
 def _settings(machine: Machine) -> Iterator[Fault]:
-    """Steps and limits of the control."""
+    """Impossible settings: least increment, largest correction, offsets."""
     for key, values, limits in (
         ("least_increment", machine.least_increment, COARSEST),
         ("max_correction", machine.max_correction, MOST_CORRECTION),
@@ -312,7 +309,7 @@ def _settings(machine: Machine) -> Iterator[Fault]:
 
 
 def _positions(machine: Machine) -> Iterator[Fault]:
-    """Tables and knots in a unit other than that of the axis, or where it never is."""
+    """Positions of tables and knots that are in another unit than the axis, or outside its range."""
     for effect in machine.effects:
         axis = machine.axis(effect.input or effect.joint)
         positions = np.array(sorted({*getattr(effect.basis, "positions", ()), *getattr(effect.basis, "knots", ())}))

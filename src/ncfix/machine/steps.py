@@ -1,8 +1,7 @@
-"""The tool tip carried through a machine step by step: formulas for numbers and for columns of numbers alike.
+"""The evaluation of a route: the tool tip carried through a machine step by step, for numbers or columns of numbers.
 
-The compiled core (`core.chain`) goes through the same operations in the same order, and sines come from numpy in
-both: so the results are the same to the last bit, and those of a pose do not depend on what other poses are worked out
-together with it.
+The compiled core (`core.chain`) does the same operations in the same order, and both take sines from numpy. So the
+results are equal to the last bit, and the result of a pose does not depend on the other poses of its batch.
 """
 
 from __future__ import annotations
@@ -14,33 +13,34 @@ import numpy as np
 Number = Any
 """A number, or a column of numbers (n,)."""
 Numbers = Any
-"""A row of them: an array of numbers, or a sequence of columns."""
+"""A row of numbers: an array, or a sequence of columns."""
 Sequence = Any
-"""An array, or a list (faster to go through where nothing is compiled)."""
+"""An array, or a list (faster in Python loops)."""
 
 SHIFT, TURN, FORTH, BACK = 0, 1, 2, 3
 """Kinds of steps: along a linear axis, about a rotary axis, by a small motion, and back by one."""
 POWERS, WAVES, GIVEN = 0, 1, 2
-"""Kinds of functions: powers of an axis position, harmonics of a rotary axis, and columns that come from elsewhere."""
+"""Kinds of functions: powers of an axis position, harmonics of a rotary axis, and columns evaluated by a basis."""
 PARTS = 9
-"""Numbers of a small motion: translation, rotation vector, velocity of the center by rotations about other points."""
+"""Number of values of a small motion: translation, rotation vector, velocity of the centre by rotations about other
+points."""
 SMALL = 1e-4
-"""rad^2; squared angles of small motions (10 mrad) up to which three terms of the power series are exact: the fourth is
-below s^3 / 5040 = 2e-16."""
+"""Squared angle of a small motion, rad^2 (10 mrad), up to which three terms of the power series are exact: the fourth
+is below s^3 / 5040 = 2e-16."""
 
 
 class Steps(NamedTuple):
     """Steps from the tool tip to the workpiece, m of them, in order.
 
-    start      (6,) the tip of a tool of no length, mm, and what each mm of length adds
+    start      (6,) the tip of a tool of length 0, mm, and its change per mm of length
     kind       (m,) SHIFT, TURN, FORTH or BACK
-    axis       (m,) that moves; of a small motion the rotary axis that carries its center along, -1 for none
-    direction  (3 m,) of that axis
-    point      (3 m,) on that axis, mm
-    center     (3 m,) of a small motion, mm
-    small      (m,) which small motion, -1 for none
-    rotates    (m,) the small motion is more than a translation
-    screws     (m,) it has rotations about several points
+    axis       (m,) the axis that moves; for a small motion, the rotary axis that carries its centre along, -1: none
+    direction  (3 m,) direction of that axis
+    point      (3 m,) point on that axis, mm
+    center     (3 m,) centre of a small motion, mm
+    small      (m,) number of the small motion, -1: none
+    rotates    (m,) whether the small motion is more than a translation
+    screws     (m,) whether it has rotations about several points
     """
 
     start: Sequence
@@ -55,15 +55,15 @@ class Steps(NamedTuple):
 
 
 class Functions(NamedTuple):
-    """What small motions are made of: f functions in g groups, and t terms, each gain times function.
+    """The values of small motions as sums: f functions in g groups, and t terms, each a gain times a function.
 
     family    (g,) POWERS, WAVES or GIVEN
-    axis      (g,) whose position is the signal, -1 for none
+    axis      (g,) the axis whose position is the signal, -1: none
     signal    (5 g,) unit, low, high, center, scale: u = (x - center) / scale, x = position / unit held in the range
-    first     (g + 1,) the first function of each group
-    order     (f,) the power or harmonic, ascending; of harmonics the cosine comes first, then the sine
-    part      (t,) the number that the term adds to: `PARTS` times the small motion, plus its place there; ascending
-    function  (t,) the function
+    first     (g + 1,) number of the first function of each group
+    order     (f,) the power or harmonic, ascending; for harmonics, the cosine comes first, then the sine
+    part      (t,) the value to which the term is added: `PARTS` times the small motion, plus its place; ascending
+    function  (t,) number of the function
     gain      (t,) mm or rad
     """
 
@@ -81,7 +81,7 @@ def turned(
     x: Number, y: Number, z: Number, dx: Number, dy: Number, dz: Number, px: Number, py: Number, pz: Number,
     sine: Number, versine: Number,
 ) -> Any:  # fmt: skip
-    """A point turned about an axis with direction d through p; versine is 1 - cosine."""
+    """A point x y z turned about an axis with direction d through p; versine is 1 - cosine."""
     ex, ey, ez = twice_crossed(dx, dy, dz, sine, versine, x - px, y - py, z - pz)
     return x + ex, y + ey, z + ez
 
@@ -125,19 +125,19 @@ def moved_back(x: Number, y: Number, z: Number, s: Number, t: Any, r: Any, a: Nu
 
 
 def held_signal(position: Number, unit: float, low: float, high: float, center: float, scale: float) -> Number:
-    """What a power is taken of: u = (x - center) / scale with x = position / unit, held at the ends of its range."""
+    """The argument of powers: u = (x - center) / scale with x = position / unit, held at the ends of its range."""
     return (np.minimum(np.maximum(position / unit, low), high) - center) / scale
 
 
 def next_wave(c: Number, s: Number, cosine: Number, sine: Number) -> Any:
-    """Cosine and sine of an angle that is larger by the one with this cosine and sine."""
+    """Cosine and sine of the sum of two angles with (c, s) and (cosine, sine)."""
     return c * cosine - s * sine, s * cosine + c * sine
 
 
 def work_out_functions(
     functions: Functions, q: Numbers, sine: Numbers, versine: Numbers, given: Numbers, found: Numbers
 ) -> None:
-    """Put the functions at axis positions q into `found`; `given` are those that come from elsewhere, in order."""
+    """Write the functions at axis positions q into `found`; `given`: those evaluated by bases, in order."""
     used = 0
     for g in range(len(functions.family)):
         axis = functions.axis[g]
@@ -163,7 +163,7 @@ def work_out_functions(
 
 
 def add_up(functions: Functions, found: Numbers, values: Numbers) -> None:
-    """Put the numbers of the small motions into `values`; those without any term are left as they are."""
+    """Write the values of the small motions into `values`; values without any term are not changed."""
     last = -1
     for t in range(len(functions.part)):
         part, term = functions.part[t], functions.gain[t] * found[functions.function[t]]
@@ -175,7 +175,7 @@ def add_up(functions: Functions, found: Numbers, values: Numbers) -> None:
 
 
 def at_tip(steps: Steps, length: Number) -> Any:
-    """Where the tip of a tool of this length is before all steps: x, y, z."""
+    """x, y, z of the tip of a tool of this length before all steps, mm."""
     start = steps.start
     return start[0] + start[3] * length, start[1] + start[4] * length, start[2] + start[5] * length
 
@@ -183,12 +183,12 @@ def at_tip(steps: Steps, length: Number) -> Any:
 def carried(
     steps: Steps, values: Numbers, point: Any, q: Numbers, sine: Numbers, versine: Numbers, largest: Number
 ) -> Any:
-    """Where a point x y z goes: x, y, z, and the largest squared angle of a small motion.
+    """x, y, z of a point after all steps, and the largest squared angle of a small motion.
 
-    values         the numbers of the small motions
+    values         the values of the small motions
     q              axis positions, mm and rad
-    sine, versine  of the rotary ones
-    largest        zero
+    sine, versine  sines and versines of the rotary axes
+    largest        zero, in the shape of the result
     """
     d, p, center, (x, y, z) = steps.direction, steps.point, steps.center, point
     for i in range(len(steps.kind)):
@@ -220,7 +220,7 @@ def carried(
 
 
 def follows(steps: Steps, column: int, sine: Numbers, versine: Numbers) -> Any:
-    """How the tip follows the linear axis with this column, along x, y, z; small motions are left out."""
+    """x, y, z of the derivative of the tip by the linear axis with this column, mm per mm, without small motions."""
     x, y, z, found, d = 0.0, 0.0, 0.0, False, steps.direction
     for i in range(len(steps.kind)):
         axis, j = steps.axis[i], 3 * i
@@ -235,10 +235,10 @@ def follows(steps: Steps, column: int, sine: Numbers, versine: Numbers) -> Any:
 def brought_back(
     steps: Steps, axes: Sequence, x: Number, y: Number, z: Number, length: Number, q: Numbers, turns: Any
 ) -> Any:
-    """What linear axes have yet to do, together, to bring a tool tip to x y z: along x, y, z; steps without errors.
+    """The motion by linear axes, as x, y, z in their common frame, that brings the tip to x y z; steps without errors.
 
-    axes   their columns; no rotary axis stands between them
-    turns  sines and versines of the rotary ones
+    axes   columns of the linear axes; no rotary axis stands between them
+    turns  sines and versines of the rotary axes
     """
     d, p, (sine, versine) = steps.direction, steps.point, turns
     ax, ay, az = at_tip(steps, length)
@@ -261,7 +261,7 @@ def brought_back(
 
 
 def volume(a: Any, b: Any, c: Any) -> Any:
-    """What three vectors x y z span, and their cross products b x c, c x a and a x b."""
+    """The volume spanned by three vectors, and their cross products b x c, c x a and a x b."""
     p = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
     q = c[1] * a[2] - c[2] * a[1], c[2] * a[0] - c[0] * a[2], c[0] * a[1] - c[1] * a[0]
     r = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
@@ -274,5 +274,5 @@ def dot(a: Any, b: Any) -> Any:
 
 
 def has_arrived(size: Number, before: Number, close: float) -> Any:
-    """Whether a gap, falling by the ratio that the last two passes show, will be below `close`."""
+    """Whether a gap is below `close`, or will be after the next pass if it keeps falling by the latest ratio."""
     return (size < close) | (size * size < close * before)
