@@ -1,4 +1,4 @@
-"""Is a well-formed measurement plausible? What cannot be is an error, what is odd is a remark."""
+"""Plausibility of well-formed measurements: impossible contents are errors, odd ones are remarks."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ from ncfix.machine.plausible import much
 from ncfix.measure.measurement import CENTRE, ENDS, Measurement, component_of, groups
 
 LARGE_MM, LARGE_RAD = 2.0, 0.02
-"""Errors of which half the rows exceed this are in another unit."""
+"""Median errors of the tool tip above this are probably in another unit."""
 BEYOND_MUCH = 10.0
-"""Times what is much of an error motion of one axis: half the rows of no machine that runs exceed this."""
+"""The same limit for an error motion of one axis, in units of a large one (`plausible.much`)."""
 SMALL_MM = 1e-4
-"""Errors of one axis that are nowhere larger are in another unit."""
+"""Errors of one axis that nowhere exceed this, mm, are probably in another unit."""
 ROUND_DEG = 1e-6
-FAR = 0.4
-"""Of the travel: positions in radians that go so far are no corner of it in degrees."""
+"""Tolerance of a rounded position, degree."""
+RADIAN_SHARE = 0.4
+"""Positions that, taken as radians, span more than this share of the travel are probably radians."""
 ELSEWHERE = 2.0
-"""mm: a ball-bar reads a millimetre or two, so poses that are farther from its circle belong to another one."""
+"""Largest distance of poses from the circle of a ball-bar, mm: the range of its reading."""
 UNITS = {"inches": 25.4, "metres": 1000.0}
-"""mm."""
-MOST = 0.8
-"""Of the travel: positions in another unit that go so far are meant to cover it."""
+"""Unit -> mm."""
+UNIT_SHARE = 0.8
+"""Positions that, in another unit, span more than this share of the travel are probably in that unit."""
 BEYOND = 1e-6
-"""How far outside its range a position may be, for numbers that were rounded: mm, rad."""
+"""Tolerance of a travel limit for rounded positions, mm or rad."""
 
 
 def checked(measurement: Measurement, machine: Machine, lines: Sequence[str] = ()) -> Measurement:
-    """The measurement with its remarks; raises `ConfigError` with all of NCF610 ... NCF612.
+    """The measurement with remarks; raises `ConfigError` with all of NCF610 ... NCF612.
 
-    lines  those of its file, to be shown with a message
+    lines  lines of the file, to be shown with messages
     """
     faults = [*_directions(measurement), *_clock(measurement), *_named(measurement, machine), *_lengths(measurement)]
     if faults:
@@ -53,7 +54,7 @@ def checked(measurement: Measurement, machine: Machine, lines: Sequence[str] = (
 
 
 def _shown(message: Message, lines: Sequence[str]) -> Message:
-    """The message with the line that it is about."""
+    """The message with the text of its source line."""
     place = message.place
     if place is None or not 0 < place.line <= len(lines):
         return message
@@ -98,7 +99,7 @@ def _named(measurement: Measurement, machine: Machine) -> Iterator[Message]:
 
 
 def _lengths(measurement: Measurement) -> Iterator[Message]:
-    """What is said to be a distance and cannot be one."""
+    """NCF612: lengths that are not positive, or whose ends coincide."""
     if measurement.kind != "length":
         return
     for name in ("length", "nominal", "radius"):
@@ -112,7 +113,7 @@ def _lengths(measurement: Measurement) -> Iterator[Message]:
 
 
 def _twice(measurement: Measurement) -> Iterator[Message]:
-    """Rows of one state in one set: repeats if a column says so, else worth a word, once for all of a file."""
+    """NCF613: rows of one state in one set without a column that marks repeats; one remark for the file."""
     if "repeat" in measurement.labels or "run" in measurement.columns:
         return
     commanded = [name for name in measurement.columns if name not in measurement.measured]
@@ -130,7 +131,7 @@ def _twice(measurement: Measurement) -> Iterator[Message]:
 
 
 def _alike(measurement: Measurement, first: int, second: int) -> bool:
-    """Whether the very same was measured."""
+    """Whether two rows have equal measured values."""
     names = measurement.measured
     return bool(names) and all(measurement.columns[n][first] == measurement.columns[n][second] for n in names)
 
@@ -154,7 +155,7 @@ def _radians(measurement: Measurement, machine: Machine) -> Iterator[Message]:
 
 
 def _commanded(measurement: Measurement, axis: str) -> tuple[Ints, Array]:
-    """Rows and positions of an axis: of whichever is measured directly in a row, and of both ends of a length."""
+    """Rows and commanded positions of an axis, mm or degree; for kind `length` of both ends."""
     if measurement.kind == "axis":
         rows = np.flatnonzero(np.array(measurement.labels["axis"]) == axis)
         return rows, measurement.column("position")[rows]
@@ -164,20 +165,23 @@ def _commanded(measurement: Measurement, axis: str) -> tuple[Ints, Array]:
 
 
 def _looks_like_radians(values: Array, low: float, high: float) -> bool:
-    """Whether these positions, most of them uneven, are round degrees once they are turned into degrees, or go as far
-    as the axis does: in degrees they would be a small corner of a travel of low ... high."""
+    """Whether positions are probably radians: most are not round, but become round degrees, or span the travel
+    low ... high (degree), when converted.
+    """
     moved = np.unique(values[np.abs(values) > ROUND_DEG])
     if len(moved) < 3 or np.abs(moved).max() > 2 * np.pi + ROUND_DEG or np.abs(moved).max() < 0.1:
         return False
     uneven = np.abs(moved - np.round(moved, 1)) > ROUND_DEG
     degrees = np.rad2deg(moved)
     even_in_degrees = np.abs(degrees - np.round(degrees)) < 0.05
-    far = np.ptp(degrees) > FAR * min(high - low, 360.0) and degrees.min() > low - 1 and degrees.max() < high + 1
+    far = (
+        np.ptp(degrees) > RADIAN_SHARE * min(high - low, 360.0) and degrees.min() > low - 1 and degrees.max() < high + 1
+    )
     return bool(uneven.mean() > 0.5 and (even_in_degrees.mean() > 0.5 or far))
 
 
 def _lengths_in_another_unit(measurement: Measurement, machine: Machine) -> Iterator[Message]:
-    """A word on positions that are a corner of the travel, and in another unit would be most of it."""
+    """NCF614: positions that, in inches or metres, would cover most of the travel."""
     for axis in machine.axes:
         rows, values = _commanded(measurement, axis.name)
         low, high = axis.range
@@ -186,7 +190,7 @@ def _lengths_in_another_unit(measurement: Measurement, machine: Machine) -> Iter
         for unit, size in UNITS.items():
             first, last = float(values.min()) * size, float(values.max()) * size
             slack = 0.01 * (high - low)
-            if last - first > MOST * (high - low) and first > low - slack and last < high + slack:
+            if last - first > UNIT_SHARE * (high - low) and first > low - slack and last < high + slack:
                 text = f"the positions of {axis.name}, {first / size:g} ... {last / size:g}, look like {unit}: "
                 row = int(rows[np.abs(values).argmax()])
                 yield Message("NCF614", f"{text}mm are asked for", measurement.place(row))
@@ -207,7 +211,7 @@ def _ranges(measurement: Measurement, machine: Machine) -> Iterator[Message]:
 
 
 def _micrometres(measurement: Measurement, machine: Machine) -> Iterator[Message]:
-    """A word on errors that no machine has: of the tip, where an axis may lie elsewhere, and of one axis itself."""
+    """NCF616: errors too large for any machine, of the tip or of one axis, or too small for any instrument."""
     for name, rows, values in _errors(measurement):
         turns = name[0] == "r" or name[1] in "ABC"
         limit, unit = (LARGE_RAD, "rad") if turns else (LARGE_MM, "mm")
@@ -225,7 +229,7 @@ def _micrometres(measurement: Measurement, machine: Machine) -> Iterator[Message
 
 
 def _circles(measurement: Measurement, machine: Machine) -> Iterator[Message]:
-    """Ball-bars whose poses are not about the stated centre: what they show of errors would be of another size."""
+    """NCF625: ball-bar poses whose distance from the stated centre is not the length of the bar."""
     if measurement.kind != "length" or not {*CENTRE, "radius"} <= measurement.columns.keys():
         return
     tip = machine.tip(measurement.positions(machine), measurement.column("tool_length"))
@@ -241,7 +245,7 @@ def _circles(measurement: Measurement, machine: Machine) -> Iterator[Message]:
 
 
 def _errors(measurement: Measurement) -> Iterator[tuple[str, Ints, Array]]:
-    """What was measured as an error: its name, in which rows, and the whole column."""
+    """Measured errors: (name, indices of its rows, whole column)."""
     if measurement.kind in ("tcp", "tcp6"):
         for name in measurement.measured:
             yield name, np.arange(len(measurement)), measurement.columns[name]

@@ -1,10 +1,10 @@
 """Kind `axis`: one error motion of one axis, read directly (interferometer, autocollimator, straightedge, level).
 
-What is read is the component at the point where it was measured, in the sense of the body's motion, whatever it
-carries. Without `# point:` that is the point that the effect itself refers to. The instrument's zero is not known, nor
-is how a straightness instrument's line is aligned: a constant, and a slope across a linear axis, per set and component.
+A reading is the component of the body's error motion at the measured point, `# point:`, or else at the reference point
+of the effect. The zero of the instrument is unknown, a constant per set and component; for straightness of a linear
+axis the alignment of the reference line is unknown as well, a slope.
 
-`positioning_figures` has the figures of ISO 230-2 and 230-3, run by run and from both sides.
+`positioning_figures` evaluates bidirectional positioning by ISO 230-2 and 230-3.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from ncfix.measure.observation import DEFAULT_NOISE, LEVER, Observation, Unknown
 from ncfix.values import frozen
 
 ANGLE = 1e-4
-"""rad: how far an angle instrument's zero may be off, in simulations."""
+"""Standard deviation of an angle instrument's zero in simulations, rad."""
 RUNS = 2
-"""With fewer runs at any place there is no repeatability."""
+"""Smallest number of runs at a position for a standard deviation."""
 K = 2.0
-"""Standard deviations of a band."""
+"""Coverage factor of the bands of ISO 230-2."""
 
 
 class DirectReading(Observation):
-    """Rows of axis, component, position, value."""
+    """Observation of kind `axis`: rows of axis, component, position, value."""
 
     def __init__(self, measurement: Measurement, machine: Machine) -> None:
         super().__init__(measurement, machine)
@@ -55,12 +55,12 @@ class DirectReading(Observation):
 
     @property
     def components(self) -> tuple[str, ...]:
-        """One value a row."""
+        """See `Observation`: one value per row."""
         return ("value",)
 
     @cached_property
     def sigma(self) -> Array:
-        """As for others, (m,); but each row says for itself whether it is an angle, and angles have repeats, too."""
+        """See `Observation`; the noise of lengths and angles is estimated from repeats separately."""
         lengths, angles = self.measurement.noise
         if angles is None and lengths is None:
             angles = self._repeats(self.turns)
@@ -70,11 +70,11 @@ class DirectReading(Observation):
 
     @property
     def noise_known(self) -> bool:
-        """See `Observation`; where there are only angles, theirs will do."""
+        """See `Observation`; if all rows are angles, their noise suffices."""
         return self.noise_stated or self._repeats(self.turns if self.turns.all() else ~self.turns) is not None
 
     def _repeats(self, rows: Mask) -> float | None:
-        """The standard deviation over repeats among these rows (n,), mm or rad."""
+        """Standard deviation over repeats among the rows of a mask (n,), mm or rad; None if they are too few."""
         return repeatability(self.measurement, self.components, self.angular, rows)
 
     @property
@@ -84,12 +84,12 @@ class DirectReading(Observation):
 
     @property
     def turns(self) -> Mask:
-        """See `Observation`: each row says for itself."""
+        """See `Observation`: by the component of each row."""
         return np.array([name[1] in "ABC" for name in self.names])
 
     @cached_property
     def unknowns(self) -> Unknowns:
-        """Zero, and slope where that is the alignment of the instrument."""
+        """Zero of each series, and slope of each straightness series."""
         if self.measurement.header("setup") == "none":
             return Unknowns.joined([])
         first = [int(np.flatnonzero(self.series_index == k)[0]) for k in range(len(self.series))]
@@ -122,13 +122,13 @@ class DirectReading(Observation):
 
     @cached_property
     def _sloped(self) -> Ints:
-        """The series that are straightness of a linear axis."""
+        """Indices of the series that are straightness of a linear axis."""
         linear = {axis.name for axis in self.machine.axes if not axis.rotary}
         names = [(name[:3], name[1] in "XYZ" and name[2] in linear) for name in self.series]
         return np.flatnonzero([shift and not self.machine.is_positioning(name) for name, shift in names])
 
     def _columns(self, effect: Effect) -> Array:
-        """What the coefficients of one effect change in each row: (n, k)."""
+        """Derivatives (n, k) of the rows by the coefficients of one effect."""
         shares = self._shares(effect)
         if not shares.any():
             return np.zeros((len(self.measurement), effect.basis.size))
@@ -137,7 +137,7 @@ class DirectReading(Observation):
         return shares[:, None] * course.rows(with_lags(poses, course.signals)).T
 
     def _shares(self, effect: Effect) -> Array:
-        """How much of an effect of size one is in each row's component, (n,)."""
+        """Factor (n,) from an effect to each row's component at the measured point."""
         same = np.array([name == effect.name for name in self.names], dtype=np.float64)
         if self.point is None or effect.location or effect.joint not in self.machine.axis_names:
             return same
@@ -166,17 +166,17 @@ class DirectReading(Observation):
 
 @frozen
 class Positioning:
-    """One error motion in one set; um, or urad for angles. From both sides unless only one was measured.
+    """Figures of ISO 230-2 for one error motion in one set, um, or urad for angles; bidirectional if both sides exist.
 
-    A  accuracy: the band of means and twice the standard deviations
-    R  repeatability: the largest band at one place, both sides; NaN with less than two runs
-    E  systematic deviation: the range of all means; M the range of the means of both sides
-    B  largest reversal; mean_reversal: over all places; NaN if one side only was measured
-    A_up, A_down, R_up, ...  the same of one side alone: approached in plus, in minus; NaN where that was not measured
-    runs  how often each place was approached from each side, at least; ISO 230-2 asks for five
+    A  accuracy: range of the means plus and minus two standard deviations
+    R  repeatability: largest band at one position; NaN with fewer than two runs
+    E  systematic positioning deviation: range of all means; M: range of the means of both directions
+    B  largest reversal value; mean_reversal: mean over all positions; NaN if one direction only was measured
+    A_up, A_down, R_up, ...  the same for approach in plus, or in minus, only; NaN if not measured
+    runs  smallest number of runs per position and direction; ISO 230-2 requires five
 
-    Values are errors of the body along the base axes: of a table axis, whose body goes towards minus as its number
-    grows, the mean reversal has another sign than that of its deviations.
+    Values are errors of the body along the base axes. The body of a table axis moves towards minus as its position
+    grows; the sign of its mean reversal is then opposite to that of its own deviations.
     """
 
     component: str
@@ -197,7 +197,7 @@ class Positioning:
 
 
 def positioning_figures(measurement: Measurement) -> Iterator[Positioning]:
-    """The figures of each component and set of direct readings; nothing for other kinds."""
+    """The figures of each component and set of a measurement of kind `axis`; none for other kinds."""
     if measurement.kind != "axis" or "value" not in measurement.columns:
         return
     pairs = zip(measurement.labels["axis"], measurement.labels["component"], strict=True)
@@ -247,9 +247,9 @@ def _series_figures(component: str, name: str, position: Array, side: Array, val
 
 
 def _bands(mean: Array, sigma: Array, reversal: Array) -> tuple[float, float, float]:
-    """Accuracy, repeatability and systematic deviation of means and standard deviations (sides, places).
+    """Accuracy, repeatability and systematic deviation, from means and standard deviations (sides, positions).
 
-    Repeatability is the largest of 4 s from one side and of 2 s + 2 s + |B| from both.
+    Repeatability is the largest of 4 s of each direction and of 2 s + 2 s + |B| of both.
     """
     systematic = float(np.nanmax(mean) - np.nanmin(mean))
     if not np.isfinite(sigma).any():

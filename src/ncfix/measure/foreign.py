@@ -1,13 +1,12 @@
-"""Files of instruments and controls that hold error motions: Renishaw `.rtl`, ISG VOLCOMP CSV, Etalon exchange.
+"""Readers of other files with error motions: Renishaw `.rtl`, ISG VOLCOMP CSV, Etalon exchange.
 
-Each becomes a measurement of kind `axis`; plugins add readers of other files, of any kind. Files are recognised by
-what they look like, not by their names. Values of `.rtl` are micrometres of positioning of the axis that the
-file names, in its own sense (actual minus target); those of the others are mm and rad, and already relative to their
-zero, so nothing of a set-up is unknown.
+Each file becomes a measurement of kind `axis`. Plugins add readers of further files, of any kind. Files are recognised
+by their content, not by their names. Values of `.rtl` are positioning deviations in micrometres, in the sense of the
+axis (actual minus target); values of the others are mm and rad relative to a known zero, so no set-up is unknown.
 
-No text of the maker describes `.rtl`; public readers and writers agree on its sections and keys: `Targets` in mm, over
-as many lines as it takes, until the next key; lines of run, target and deviation in micrometres. Which error was
-measured is not in the file, but for its free texts: it is read as positioning, and refused where they say otherwise.
+The maker does not publish the format `.rtl`; public readers and writers agree on its sections and keys: `Targets` in
+mm, over several lines until the next key; lines of run, target and deviation in micrometres. The file does not state
+which error was measured, except in free texts: it is read as positioning, and refused if these say otherwise.
 """
 
 from __future__ import annotations
@@ -39,20 +38,21 @@ KEY = re.compile(r"([A-Za-z][\w -]*?)\s*:(.*)")
 LETTER = re.compile(
     r"(?<![0-9a-z\u00c0-\u024f])([a-z])(?:[\s_-]*(?:axis|achse))?(?![0-9a-z\u00c0-\u024f])", re.IGNORECASE
 )
-"""A letter that stands alone among words of any language: `X-axis`, `Eje X`, `X\u8f74`."""
+"""A single letter as a word, in any language: `X-axis`, `Eje X`, `X\u8f74`."""
 OTHER = re.compile(r"straight|square|angular|flatness|diagonal|(?<![a-z])(?:pitch|yaw|roll)(?![a-z])", re.IGNORECASE)
-"""Words of a title that speak of another error than positioning."""
+"""Words of a title that mean another error than positioning."""
 ANOTHER_ERROR = re.compile(r"\.rt[a-km-z]")
-"""Endings of files of angles (.rta), straightness (.rts) and others, which have the same sections as `.rtl`."""
+"""Suffixes of files of other errors, such as angles (.rta) and straightness (.rts), with the sections of `.rtl`."""
 MICROMETRE = 1e-3
+"""mm per micrometre."""
 
 Reader = Callable[[str, str], Measurement | None]
-"""Makes a measurement of a text and its path, or None if the text is not of its kind."""
+"""A function of text and path that returns a measurement, or None if it does not know the format."""
 
 
 @mutable(slots=False)
 class Rows:
-    """Direct readings as they are collected."""
+    """A list of direct readings that a reader collects."""
 
     path: str
     component: list[str] = field(default_factory=list)
@@ -64,7 +64,7 @@ class Rows:
     remarks: list[Message] = field(default_factory=list)
 
     def add(self, component: str, position: float, value: float, line: int, run: int = 1, direction: int = 0) -> None:
-        """One reading."""
+        """Add one reading; `position` in mm or degree, `value` in mm or rad."""
         self.component.append(component)
         self.position.append(position)
         self.value.append(value)
@@ -73,7 +73,7 @@ class Rows:
         self.direction.append(direction)
 
     def measurement(self, setup: str, instrument: str) -> Measurement:
-        """All of them."""
+        """The readings as a measurement; raises `ConfigError` NCF609 if there are none."""
         if not self.line:
             raise ConfigError.of("NCF609", f"{instrument}: there are no readings", Place(self.path))
         names = ("position", "value", "run", "direction")
@@ -85,7 +85,7 @@ class Rows:
 
 
 def recognised(text: str, machine: Machine, path: str) -> Measurement | None:
-    """The measurement in an instrument's file, or None; raises `ConfigError` NCF609 ... NCF618."""
+    """The measurement in an instrument's file; None if no reader knows it. Raises `ConfigError` NCF606 ... NCF618."""
     reader = _reader(text)
     found = reader(text, path) if reader is not None else _by_plugin(text, path)
     if found is None:
@@ -99,10 +99,10 @@ def recognised(text: str, machine: Machine, path: str) -> Measurement | None:
 
 
 def of_bodies(measurement: Measurement, machine: Machine) -> Measurement:
-    """Positioning deviations that count the way the number of the axis grows, as errors along the base axes: a table
-    axis goes against.
+    """Convert positioning deviations from the sense of the axis to errors of the body along the base axes.
 
-    Raises `ConfigError` NCF618 of an axis that is slanted against its error axis.
+    The sign of a table axis, whose body moves against its positive direction, is reversed. Raises `ConfigError` NCF618
+    for an axis that is not parallel to its error axis.
     """
     factor = np.ones(len(measurement))
     for axis, component, rows in _positioned(measurement, machine):
@@ -115,7 +115,7 @@ def of_bodies(measurement: Measurement, machine: Machine) -> Measurement:
 
 
 def backwards(measurement: Measurement, machine: Machine, code: str, hint: str) -> Iterator[Message]:
-    """A word on positioning of axes whose bodies go against their numbers: nobody says how a table counts."""
+    """Remarks, with this code and hint, on positioning of axes whose bodies move against their positive direction."""
     for axis, component, rows in _positioned(measurement, machine):
         if axis.along(component) < 0:
             own = f"E{component}{axis.name}"
@@ -124,7 +124,7 @@ def backwards(measurement: Measurement, machine: Machine, code: str, hint: str) 
 
 
 def _positioned(measurement: Measurement, machine: Machine) -> Iterator[tuple[Axis, str, list[int]]]:
-    """The axes whose positioning was read, with its component and the rows of that."""
+    """The axes whose positioning was read: (axis, component, indices of the rows)."""
     read = list(map(component_of, measurement.labels["axis"], measurement.labels["component"]))
     for axis in machine.axes:
         for component in filter(axis.owns, COMPONENTS):
@@ -134,7 +134,7 @@ def _positioned(measurement: Measurement, machine: Machine) -> Iterator[tuple[Ax
 
 
 def _by_plugin(text: str, path: str) -> Measurement | None:
-    """What the first reader of a plugin makes of it that knows it."""
+    """The measurement by the first plugin reader that knows the format; None if there is none."""
     readers: dict[str, Reader] = registry("readers")
     gives = (Measurement, type(None))
     found = (called("readers", name, read, text, path, gives=gives) for name, read in readers.items())
@@ -151,9 +151,10 @@ def _reader(text: str) -> Callable[[str, str], Measurement] | None:
 
 
 def renishaw(text: str, path: str) -> Measurement:
-    """A Renishaw `.rtl`: targets in mm, deviations in um by run and target.
+    """The measurement in a Renishaw `.rtl`: targets in mm, deviations in um by run and target.
 
-    A target is approached from the one before it in its run; at the end of a run that turns back, from beyond.
+    The direction of approach of a target is that from the target before it in its run. At a reversal, where two
+    consecutive targets are equal, it is that of the next motion.
     """
     file = _rtl(text, path)
     axis, rows = file.axis(), Rows(path)
@@ -170,7 +171,7 @@ def renishaw(text: str, path: str) -> Measurement:
 
 
 def isg(text: str, path: str) -> Measurement:
-    """An ISG VOLCOMP CSV of one axis: its position, then the components that the first line names, mm and rad."""
+    """The measurement in an ISG VOLCOMP CSV of one axis: position, then the errors named in the first line, mm, rad."""
     rows, names = Rows(path), _first_words(text)
     where = Place(path, next(n for n, line in enumerate(text.splitlines(), 1) if line.split("//")[0].strip()))
     axis, *components = names
@@ -194,7 +195,7 @@ def isg(text: str, path: str) -> Measurement:
 
 
 def _check_isg_names(axis: str, components: Sequence[str], where: Place) -> None:
-    """Raise `ConfigError` NCF618 if these are no columns of one axis."""
+    """Raise `ConfigError` NCF618 unless these are the columns of one axis."""
     text = ""
     if len(axis) > 1:
         text = f"the first column is {axis!r}, not the position of an axis: X"
@@ -211,7 +212,10 @@ def _check_isg_names(axis: str, components: Sequence[str], where: Place) -> None
 
 
 def etalon(text: str, path: str) -> Measurement:
-    """An Etalon exchange file: sections [EXY] with position and value, mm and rad. Squareness values are left out."""
+    """The measurement in an Etalon exchange file: sections [EXY] of position and value, mm and rad.
+
+    Squareness values are skipped with a remark.
+    """
     rows, section = Rows(path), ""
     for number, line in enumerate(text.splitlines(), 1):
         plain = line.split("//")[0].strip()
@@ -232,7 +236,7 @@ def etalon(text: str, path: str) -> Measurement:
 
 
 def _located(name: str, called: str = "") -> str:
-    """What is said of a location error in a file of error motions."""
+    """The remark on a location error in a file of error motions."""
     return f"[{called or name}] is a location error, not an error motion: put {name} into the machine file"
 
 
@@ -250,7 +254,7 @@ def _first_words(text: str) -> list[str]:
 
 @frozen
 class Deviation:
-    """One deviation: run and target from 1, mm, and the line of the file."""
+    """One deviation of an `.rtl`: run and target, counted from 1; value, mm; line of the file."""
 
     run: int
     target: int
@@ -260,7 +264,7 @@ class Deviation:
 
 @mutable
 class Rtl:
-    """What stands in a file: texts of its keys with their lines, the targets (mm), and the readings."""
+    """The content of an `.rtl`: key -> (text, line), targets (mm), and readings."""
 
     path: str
     texts: dict[str, tuple[str, int]] = field(default_factory=dict)
@@ -268,7 +272,7 @@ class Rtl:
     readings: list[Deviation] = field(default_factory=list)
 
     def axis(self) -> str:
-        """The letter of the axis; raises `ConfigError` NCF618 if there is none, or another error was measured."""
+        """The letter of the axis; raises `ConfigError` NCF618 if it is missing or another error was measured."""
         text, line = self.texts.get("axis", ("", 0))
         letters = {match[1].upper() for match in LETTER.finditer(text)}
         if len(letters) != 1:
@@ -288,7 +292,7 @@ class Rtl:
         return letter
 
     def checked(self) -> Rtl:
-        """The file, if its counts agree and its readings are of its targets; raises `ConfigError` NCF609, NCF618."""
+        """The file, checked for consistent counts and targets; raises `ConfigError` NCF609, NCF618."""
         counts = {"target-count": len(self.targets), "run-count": len({each.run for each in self.readings})}
         if not self.targets:
             raise self.odd("there is no line `Targets:`, or nothing below it", 0)
@@ -336,7 +340,7 @@ def _deviation(file: Rtl, words: list[str], line: int) -> Deviation:
 
 
 def number_of(word: str, path: str, line: int) -> float:
-    """A finite number; raises `ConfigError` NCF608."""
+    """A finite number from text; raises `ConfigError` NCF608."""
     try:
         value = float(word)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Measured rows with their commanded state, column by column: what each kind has, and as text (docs/formats.md, 3)."""
+"""A measurement: columns of measured values and commanded states; its kinds and its text (docs/formats.md, 3)."""
 
 from __future__ import annotations
 
@@ -16,25 +16,27 @@ from ncfix.machine.axes import COMPONENTS, NAME
 from ncfix.values import frozen
 
 DIGITS = 9
-"""Decimals of mm, degree and rad in files: below any instrument."""
+"""Decimals of mm, degree and rad in files: beyond the resolution of any instrument."""
 STATES = re.compile(
     r"time_s|load_kgm?|feed_mm_min|spindle_rpm|tool_length|spindle_deg|temp_[a-z0-9_]+"
     r"|(?:spike|settling)_[a-z]|(?:speed|accel|slave)_[a-z]_[a-z]"
 )
-"""Optional columns of the state that are numbers; directions and labels are apart."""
+"""Names of optional numeric state columns, without directions of approach."""
 NOTES = ("instrument", "date", "origin", "operator", "note")
-"""Header lines for people."""
+"""Header keys for people."""
 COMMON = ("ncfix-measurement", "kind", "noise_um", "noise_urad", *NOTES)
 
 
 @frozen
 class MeasurementKind:
-    """The columns of a kind of measurement besides axes and state.
+    """A kind of measurement and its columns besides axes and state.
 
-    measured  the columns that the instrument filled in: empty in a plan
-    labels    columns that are names, not numbers
-    headers   header lines besides the common ones
-    any_of    at least one of `measured` is enough
+    required  columns that must be present
+    measured  columns of measured values, empty in a plan
+    optional  further columns
+    labels    columns of names, not numbers
+    headers   header keys besides the common ones
+    any_of    one of `measured` is sufficient
     """
 
     name: str
@@ -48,7 +50,7 @@ class MeasurementKind:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """All columns of its own."""
+        """All columns of the kind, besides axes and state."""
         return (*self.required, *self.measured, *self.optional)
 
 
@@ -108,7 +110,7 @@ CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
     "frame": {"tcp": ("workpiece", "base"), "tcp6": ("workpiece", "base"), "points": ("instrument", "base")},
     "carried_by": {"points": ("tool", "spindle", "workpiece")},
 }
-"""What a header line may say, by kind; the first is the default."""
+"""Header key -> kind -> allowed values; the first is the default."""
 
 
 @frozen(eq=False, slots=False)
@@ -119,9 +121,9 @@ class Measurement:
     headers   header lines in their order: (key, text)
     columns   name -> (n,) numbers as in the file: mm, degree, s
     labels    name -> n texts (ball, target, axis, component, set)
-    lines     (n,) line of each row in the file, 0 if there is none
-    path      where it came from
-    remarks   what looked odd while it was read
+    lines     (n,) line number of each row in the file, 0 if unknown
+    path      path of the file
+    remarks   remarks of the reader
     """
 
     kind: str
@@ -139,21 +141,21 @@ class Measurement:
 
     @property
     def form(self) -> MeasurementKind:
-        """What this kind has for columns."""
+        """The definition of this kind."""
         return KINDS[self.kind]
 
     def header(self, key: str) -> str:
-        """A header line's value; of those with choices the default, of others nothing, if it is not there."""
+        """The value of a header line; if it is missing, the default of its choices, or ""."""
         default = CHOICES.get(key, {}).get(self.kind, ("",))[0]
         return next((text for name, text in self.headers if name == key), default)
 
     def all_headers(self, key: str) -> list[str]:
-        """The values of a header line that may come more than once."""
+        """All values of a repeated header line."""
         return [text for name, text in self.headers if name == key]
 
     @property
     def noise(self) -> tuple[float | None, float | None]:
-        """Standard deviation of one value, (mm, rad); None where the header does not say."""
+        """Stated standard deviation of a length, mm, and of an angle, rad; None if not stated."""
         lengths, angles = self.header("noise_um"), self.header("noise_urad")
         return float(lengths) * 1e-3 if lengths else None, float(angles) * 1e-6 if angles else None
 
@@ -169,18 +171,18 @@ class Measurement:
 
     @cached_property
     def stays(self) -> bool:
-        """Whether nothing but time and warmth changes, as in a test of drift: its rows are no repeats."""
+        """Whether only time and temperatures vary, as in a test of drift; its rows are then no repeats."""
         labels = [texts for name, texts in self.labels.items() if name not in ("set", "repeat")]
         held = all(len(set(texts)) < 2 for texts in labels)
         changing = [n for n, each in self.columns.items() if n not in (*self.measured, "run") and np.ptp(each) > 0]
         return held and bool(changing) and all(name == "time_s" or name.startswith("temp_") for name in changing)
 
     def column(self, name: str, default: float = 0.0) -> Array:
-        """A column of numbers (n,), in the units of the file, or the default in every row."""
+        """A column of numbers (n,), in the units of the file; the default in every row if it is missing."""
         return self.columns.get(name, np.full(len(self), default))
 
     def stacked(self, *names: str) -> Array:
-        """Columns beside each other, (n, k)."""
+        """Several columns as one array, (n, k)."""
         return np.stack([self.columns[name] for name in names], axis=-1)
 
     def positions(self, machine: Machine) -> Array:
@@ -188,14 +190,14 @@ class Measurement:
         return np.stack([self.column(axis.name) * axis.unit for axis in machine.axes], axis=-1)
 
     def state(self, machine: Machine) -> State:
-        """The rest of the state of each row."""
+        """The state of each row besides positions: tool length, directions of approach, inputs."""
         direction = np.stack([self.column(f"dir_{axis.name}") for axis in machine.axes], axis=-1)
         names = [name for name in self.columns if name in machine.inputs or STATES.fullmatch(name)]
         inputs = {name: self.columns[name] for name in names if name != "tool_length"}
         return State(self.column("tool_length"), direction, inputs)
 
     def place(self, row: int) -> Place:
-        """Where a row stands in its file."""
+        """The place of a row in its file."""
         return Place(self.path, int(self.lines[row]) if len(self.lines) else row + 1)
 
     def with_columns(self, values: Mapping[str, Array]) -> Measurement:
@@ -208,7 +210,7 @@ class Measurement:
         return replace(self, headers=(*rest, (key, text)))
 
     def rows(self, keep: Sequence[int] | Ints | Mask) -> Measurement:
-        """Some of the rows."""
+        """The measurement with some of the rows, by index or mask."""
         index = np.arange(len(self))[keep]
         return replace(
             self,
@@ -219,14 +221,14 @@ class Measurement:
 
 
 def groups(labels: Sequence[str]) -> tuple[tuple[str, ...], Ints]:
-    """The distinct labels in their order of appearance, and the number of each row's label."""
+    """The distinct labels in order of appearance, and for each row the index of its label among these."""
     names = tuple(dict.fromkeys(labels))
     places = {name: index for index, name in enumerate(names)}
     return names, np.array([places[label] for label in labels], dtype=np.int64)
 
 
 def component_of(axis: str, component: str) -> str | None:
-    """The ISO 230-1 name of a component given as `EYX` or as `Y`; None if it is none of this axis."""
+    """The ISO 230-1 name of an error motion given as `EYX` or as component `Y`; None if it is not one of this axis."""
     name = f"E{component}{axis}" if component in tuple(COMPONENTS) else component
     match = NAME.fullmatch(name)
     return name if match and match[3] == axis and not match[2] else None
@@ -246,6 +248,6 @@ def dumps(measurement: Measurement, empty: tuple[str, ...] = ()) -> str:
 
 
 def number(value: float) -> str:
-    """A number as short as it is at nine decimals."""
+    """A number as text with at most `DIGITS` decimals, without trailing zeros."""
     text = f"{value:.{DIGITS}f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text

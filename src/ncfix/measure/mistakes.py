@@ -1,8 +1,8 @@
-"""Mistakes in measurement files: one is suspected where undoing it explains the readings far better than the file does.
+"""Detection of mistakes in measurement files: one is suspected if undoing it explains the readings far better.
 
-They are columns exchanged or of the other sign, radians for degrees, an axis turned round, a set that was read the
-other way, length standards of which one is wrong. A mistake is judged where it is said to be: a set that was read
-wrongly is a tenth of a file of ten, and what all the others leave, or do not leave, says nothing about it.
+Mistakes are exchanged columns, wrong signs, radians for degrees, a reversed axis, a set read with the wrong sign, or a
+wrong length standard. A mistake is judged by the values that it affects only: a wrong set may be a tenth of a file, and
+the residuals of the other sets say nothing about it.
 """
 
 from __future__ import annotations
@@ -23,45 +23,46 @@ from ncfix.measure.measurement import Measurement
 from ncfix.values import frozen
 
 ODD = {"NCF614", "NCF615", "NCF616"}
-"""Remarks on a file that are mistakes where the model does not describe the data: positions out of range or like
-radians, errors like um."""
+"""Codes of remarks on positions and errors that probably are mistakes if the model does not describe the data."""
 BETTER = 0.2
-"""Squares left after undoing a mistake, of those before, from which on it is taken for one."""
+"""Largest ratio of the squared residuals after and before undoing a mistake, for it to be suspected."""
 LIKELY = 0.5
-"""The same where the file itself looks like a mistake (`ODD`)."""
+"""The same if the file has a remark of `ODD`."""
 NOISE = 0.3
-"""The same where what is left is noise alone."""
-ALIKE = 1.5
-"""Of orders and signs that leave at most this times the least, the simplest is meant."""
+"""The same if the residual after undoing it is only noise."""
+SIMILAR = 1.5
+"""Among column orders and signs with residuals within this factor of the smallest, the simplest is chosen."""
 CHANCE = 1e-3
-"""How likely the best of all that are tried may be so good by chance."""
+"""Largest probability by chance of the best mistake among all tried."""
 LARGE = 2.5
-"""Squares a value, in units of the noise, below which there is nothing to explain."""
+"""Mean squared residual, in units of the noise, below which there is nothing to explain."""
 WORTH = 0.95
-"""Squares left by one more set of the other sign, of those before, up to which the next is looked for."""
+"""Largest ratio of the squared residuals by reversing one more set, for that set to be reversed."""
 GATHERED_MM = 1.0
-"""Tips of a set that are nearer to each other were on a ball: errors and a ball's place are far smaller."""
+"""Largest spread of the tips of a set that were at a ball, mm: errors are far smaller."""
 GATHERED = 0.05
-"""Of the spread of the tips as the file has them: what is left where a mistake was undone."""
+"""Largest ratio of the spread of the tips after and before undoing a mistake of positions."""
 ROWS = 5
-"""Rows of a set from which on it can be said whether its tips stay where they are."""
+"""Smallest number of rows of a set whose spread counts."""
 ENOUGH = 600
-"""Rows of a file that are looked at."""
+"""Largest number of rows of a file that are used."""
 MOST_SETS = 12
-"""Sets that are tried each by itself."""
+"""Largest number of sets of a file that are tried one by one."""
 TURN_RAD = 2 * np.pi + 0.01
+"""Largest position, in radians, of an axis that may have been given in radians."""
 OTHER_SIGN = "which way was the instrument set up there?"
 
 
 @frozen(slots=False)
 class Suspect:
-    """A mistake that may have been made in a file, or in several alike: what it is, how to repair it, and the files
-    without it.
+    """A possible mistake in one file or several.
 
-    file    the first of them
-    scaled  lengths of these values of the file (m,) may be longer by a common factor
-    others  the other files without the same mistake
-    rows    file -> where in it the mistake is, if it is not everywhere
+    text, hint   the mistake, and how to repair it
+    file         index of the first file concerned
+    measurement  that file without the mistake
+    scaled       (m,) values of the file that may be wrong by a common factor, zero elsewhere; None: no scale error
+    others       index -> other files with the same mistake, without it
+    rows         index of file -> mask of the rows with the mistake; empty: all
     """
 
     text: str
@@ -74,10 +75,10 @@ class Suspect:
 
 
 def suspected(problem: Problem) -> tuple[Message, ...]:
-    """NCF617: the mistake that explains the readings, if one does far better than the files as they are.
+    """NCF617: the mistake that explains the readings far better than the unchanged files, if there is one.
 
-    Each is undone in turn, and everything is fitted anew: noise and missing effects hardly ever look like one of these
-    few, a mistake is explained by it nearly all.
+    Each mistake is undone in turn and everything fitted anew. Undoing a real mistake explains nearly the whole misfit;
+    noise and missing effects hardly ever look like one of these mistakes.
     """
     data = [each.measurement for each in problem.observations]
     data = [each.rows(np.unique(np.linspace(0, len(each) - 1, ENOUGH).astype(int))) for each in data]
@@ -118,9 +119,9 @@ def suspected(problem: Problem) -> tuple[Message, ...]:
 
 
 def _scattered(data: Sequence[Measurement], machine: Machine) -> tuple[Message, ...]:
-    """NCF617: the tips of each set stay at one place, as on a ball, but only once the positions are repaired.
+    """NCF617: a mistake of positions without which the tips of each set stay at one place, as at a ball.
 
-    This needs no reading: where errors hardly depend on these positions, no fit would tell.
+    This test does not use the readings, and so also works if errors hardly depend on these positions.
     """
     for each in _suspects(data, machine):
         before = data[each.file]
@@ -134,7 +135,7 @@ def _scattered(data: Sequence[Measurement], machine: Machine) -> tuple[Message, 
 
 
 def _spread(measurement: Measurement, machine: Machine) -> float:
-    """How far the tips are from the middle of their set, the median over sets of the root mean square, mm."""
+    """Median over sets of the rms distance of the tips from their centre, mm."""
     tips = machine.tip(measurement.positions(machine), measurement.column("tool_length"))
     names = np.array(measurement.sets)
     every = [tips[names == name] for name in dict.fromkeys(measurement.sets)]
@@ -144,9 +145,9 @@ def _spread(measurement: Measurement, machine: Machine) -> float:
 
 @frozen(slots=False)
 class _Left:
-    """What a fit leaves: squares (m,) in units of the noise, and the share of the values that are free.
+    """Residuals of a fit: squares (m,) in units of the noise, and the degrees of freedom as a share of m.
 
-    Gross outliers would decide between suspects, so none counts for more than four times the median.
+    Residuals are limited to four robust standard deviations, so that gross outliers do not decide between suspects.
     """
 
     squares: Array
@@ -159,12 +160,12 @@ class _Left:
         return _Left(np.minimum(size, most) ** 2, max(len(rest) - fitted, 1) / len(rest))
 
     def mean(self, there: Mask | None = None) -> float:
-        """Squares a free value, of all or of some."""
+        """Mean squared residual per degree of freedom, of all values or of those in a mask."""
         return float((self.squares if there is None else self.squares[there]).mean()) / self.share
 
 
 def _left(data: Sequence[Measurement], problem: Problem, suspect: Suspect | None = None) -> _Left | None:
-    """What is left with all effects and set-ups fitted; None if that fails."""
+    """Residuals with all effects and set-ups fitted; None if the fit fails."""
     try:
         seen = Problem.of(data, problem.machine, problem.selection)
         rest = seen.residual(problem.selection.start, seen.start) / seen.sigma
@@ -180,7 +181,7 @@ def _left(data: Sequence[Measurement], problem: Problem, suspect: Suspect | None
 
 
 def _sets(data: Sequence[Measurement]) -> Iterator[tuple[int, str, Mask]]:
-    """The first sets of each file, and where they are."""
+    """The first `MOST_SETS` sets of each file: (index of file, name, mask of its rows)."""
     for file, measurement in enumerate(data):
         names = np.array(measurement.sets)
         for name in list(dict.fromkeys(measurement.sets))[:MOST_SETS]:
@@ -188,7 +189,7 @@ def _sets(data: Sequence[Measurement]) -> Iterator[tuple[int, str, Mask]]:
 
 
 def _part(problem: Problem, file: int) -> slice:
-    """Where the values of a file are."""
+    """The slice of the values of a file."""
     first = sum(len(each.values) for each in problem.observations[:file])
     return slice(first, first + len(problem.observations[file].values))
 
@@ -207,7 +208,7 @@ def _suspects(data: Sequence[Measurement], machine: Machine) -> Iterator[Suspect
 
 
 def _units(file: int, measurement: Measurement, machine: Machine) -> Iterator[Suspect]:
-    """Radians for degrees, of one rotary axis or of all."""
+    """Suspects: positions in radians, of one rotary axis or of all."""
     there = [axis.name for axis in machine.axes if axis.rotary and np.ptp(measurement.column(axis.name)) > 0]
     small = [name for name in there if np.abs(measurement.column(name)).max() <= TURN_RAD]
     for names in [(name,) for name in small] + ([tuple(small)] if len(small) > 1 else []):
@@ -217,7 +218,7 @@ def _units(file: int, measurement: Measurement, machine: Machine) -> Iterator[Su
 
 
 def _turned(file: int, measurement: Measurement, machine: Machine) -> Iterator[Suspect]:
-    """An axis that is counted the other way."""
+    """Suspects: an axis whose positions have the wrong sign."""
     for axis in machine.axes:
         name = axis.name
         columns = {each: -measurement.columns[each] for each in _of(measurement, name)}
@@ -235,7 +236,7 @@ def _of(measurement: Measurement, axis: str) -> list[str]:
 
 
 def _swapped(file: int, measurement: Measurement, machine: Machine) -> Iterator[Suspect]:
-    """Positions of two axes that were exchanged."""
+    """Suspects: exchanged position columns of two axes."""
     for kind in (True, False):
         names = [axis.name for axis in machine.axes if axis.rotary == kind and _of(measurement, axis.name)]
         for first, second in combinations(names, 2):
@@ -249,7 +250,7 @@ def _swapped(file: int, measurement: Measurement, machine: Machine) -> Iterator[
 
 
 def _series(file: int, measurement: Measurement, files: int) -> Iterator[Suspect]:
-    """One set, or a whole file beside others, that was read with the other sign or against a standard that is wrong."""
+    """Suspects: a set, or a file beside others, with readings of the wrong sign or of a wrong length standard."""
     parts = [(f"set {name}", rows) for _, name, rows in _sets([measurement])]
     if len(parts) < 2:
         parts = []
@@ -269,7 +270,7 @@ def _series(file: int, measurement: Measurement, files: int) -> Iterator[Suspect
 
 @frozen(slots=False)
 class _Readings:
-    """What is left of other readings of the same positions: positions, effects and set-ups stay, so this is linear."""
+    """Residuals of modified readings at the same positions, which need no new design: a linear operation."""
 
     problem: Problem
     basis: Array
@@ -282,11 +283,11 @@ class _Readings:
         return _Readings(seen, orthonormal(seen.columns), predicted)
 
     def left(self, values: Array) -> _Left:
-        """What these values leave."""
+        """Residuals of these values."""
         return _Left.of(without(self.basis, (values - self.predicted) / self.problem.sigma), self.basis.shape[1])
 
     def where(self, rows: Mapping[int, Mask]) -> Mask:
-        """The values (m,) of these rows of files; all for none."""
+        """Mask (m,) of the values of these rows; all values if `rows` is empty."""
         there = [
             rows[file][each.rows] & (each.rows >= 0) if file in rows else np.full(len(each.values), not rows)
             for file, each in enumerate(self.problem.observations)
@@ -295,8 +296,8 @@ class _Readings:
 
 
 def _exchanged(data: Sequence[Measurement], readings: _Readings) -> Iterator[tuple[_Left, Suspect, int]]:
-    """The measured columns of a set, a file, or all files in the order and with the signs that leave least; of how
-    many. A set that was read with the other sign altogether is one of `_series`.
+    """For each set, each file, and all files together: the best order and signs of the measured columns, as a suspect,
+    with its residuals and the number tried. A set with all signs reversed belongs to `_series`.
     """
     files = [file for file, measurement in enumerate(data) if measurement.kind == "tcp"]
     if not files:
@@ -325,7 +326,7 @@ def _exchanged(data: Sequence[Measurement], readings: _Readings) -> Iterator[tup
         changed = {
             way: sum(k != place or sign < 0 for k, (place, sign) in enumerate(zip(*way, strict=True)))
             for way, left in tried.items()
-            if left.mean() <= ALIKE * least
+            if left.mean() <= SIMILAR * least
         }
         way = min(changed, key=lambda way: (changed[way], tried[way].mean()))
         first, look = min(together), _look(names, *way)
@@ -340,7 +341,7 @@ def _exchanged(data: Sequence[Measurement], readings: _Readings) -> Iterator[tup
 
 
 def _negated(data: Sequence[Measurement], readings: _Readings) -> Iterator[tuple[_Left, Suspect, int]]:
-    """Several sets that were read with the other sign: the one that helps most, then the next, as long as one does."""
+    """A suspect of several sets with the wrong sign, found one after another; with residuals and the number tried."""
     kinds = ("tcp", "tcp6", "axis")
     every = {(file, name): rows for file, name, rows in _sets(data) if data[file].kind in kinds}
     if len(every) < 3:

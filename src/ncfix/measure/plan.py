@@ -1,10 +1,11 @@
-"""Measurement plans: which poses tell most (Soons, section 3.3; exchange after Fedorov).
+"""Measurement plans: the poses that determine the errors best (Soons, section 3.3; exchange algorithm of Fedorov).
 
-From many candidates a first choice maximises the determinant of the information (D-optimal); poses are then exchanged
-one at a time as long as the worst prediction variance over the working volume falls (G-optimal). What no candidate can
-tell is left out beforehand. To separate two effects, the variances of their coefficients take the place of predictions.
+From many candidates a first choice maximises the determinant of the information (D-optimal). Poses are then exchanged
+one at a time as long as the largest prediction variance over the working volume falls (G-optimal). Coefficients that no
+candidate determines are left out first. To separate two effects, the variances of their coefficients replace the
+prediction variances.
 
-`skeleton` makes a skeleton of the program that takes a machine to the poses. Probing itself is the control's own cycle.
+`skeleton` writes the skeleton of an NC program that moves to the poses. Probing itself is a cycle of the control.
 """
 
 from __future__ import annotations
@@ -28,40 +29,43 @@ from ncfix.measure.selection import Selection, form, select
 from ncfix.values import frozen
 
 CANDIDATES = 800
+"""Smallest number of candidate poses."""
 POOR = 10.0
-"""um per um of noise from which on a plan says next to nothing of some combination of coefficients."""
+"""Largest standard deviation of a prediction, um per um of noise, from which a plan hardly determines a combination."""
 SHARED = 0.3
-"""Of the largest share in that combination: what has less is not named."""
+"""Smallest share of a coefficient in that combination, relative to the largest, from which it is named."""
 PLACES = 1000
-"""Poses at which the predictions are judged."""
+"""Number of poses at which predictions are evaluated."""
 ACTIVE = 250
-"""Predictions, the worst ones, that an exchange looks at; the rest is looked at again after each pass."""
+"""Number of predictions, the worst ones, that an exchange considers; all are checked after each pass."""
 RIDGE = 1e-9
-"""Information that counts as none, of that of a candidate."""
+"""Information added on the diagonal, relative to that of a candidate, to keep the matrix regular."""
 PASSES = 8
+"""Largest number of passes of the exchange."""
 FIRST, CHUNK = 32, 32
-"""Targets that an addition looks at first; candidates that it looks at more closely at a time."""
+"""Number of worst targets that bound the effect of an addition; number of candidates then evaluated at once."""
 STARTS, SMALL = 20, 20_000
-"""Random starts besides the first choice, where candidates times predictions are few."""
+"""Number of random starts besides the first choice, if candidates times predictions are fewer than `SMALL`."""
 ALONE = 1e-5
-"""A pose of which no more is told by the others is not taken off by a formula."""
+"""Smallest eigenvalue of a pose's remaining share at which it is removed by an update, not by a new inversion."""
 RIDDEN = 1e-2
-"""Nor is any where the ridge has more than this share in what is known least."""
+"""Largest share of the ridge in the least determined combination at which updates are accurate enough."""
 EXCHANGED = 1e-3
-"""A relative gain below this is none."""
+"""Smallest relative gain of an exchange."""
 WORTHWHILE = 5e-3
-"""A pass that gains less is the last one."""
+"""Smallest relative gain of a pass; one that gains less is the last."""
 READ = dict(zip("XYZ", ("mx", "my", "mz"), strict=True))
 
 
 @frozen(eq=False, slots=False)
 class Planned:
-    """A plan and how good it is.
+    """A plan and its quality.
 
-    plan      the poses, in an order in which none follows a pattern in time
-    worst_um  the largest standard deviation of the predicted tip error over the volume for a noise of 1 um, mean_um
-    seen      labels of the coefficients that it determines; unseen: those that no candidate can
-    open      labels of those that make up what is known least, where that is POOR or worse
+    plan      the poses in random order, so that no error is confounded with time
+    worst_um  largest standard deviation of the predicted tip error over the volume, um, for a noise of 1 um
+    mean_um   root mean square of that standard deviation, um
+    seen      labels of the coefficients that the plan determines; unseen: of those that no candidate determines
+    open      labels of the coefficients in the least determined combination, if that is `POOR` or worse
     """
 
     plan: Measurement
@@ -82,10 +86,10 @@ def plan(
     existing: Measurement | None = None,
     seed: int = 0,
 ) -> Planned:
-    """The poses, of many, that determine the errors best.
+    """The `count` poses, among many candidates, that determine the errors best.
 
-    separate  effects whose coefficients are to be told apart, instead of predictions everywhere
-    existing  poses that are measured already: the new ones complete them
+    separate  names of effects to be told apart; then the variances of their coefficients count, not predictions
+    existing  poses already measured, which the new ones complete
 
     Raises `UsageError` NCF025, NCF635, NCF636.
     """
@@ -121,7 +125,7 @@ def plan(
 
 
 def _least_known(pool: Pool, rows: Sequence[int], count: int) -> Ints:
-    """Which of the first `count` columns make up the combination that the worst predicted target suffers from."""
+    """Indices, among the first `count` columns, of the combination that contributes most to the largest variance."""
     inverse = np.linalg.inv(information(pool, rows))
     worst = pool.targets[variances(pool, rows).argmax()]
     variance, ways = np.linalg.eigh(inverse)
@@ -130,7 +134,7 @@ def _least_known(pool: Pool, rows: Sequence[int], count: int) -> Ints:
 
 
 def _can_be_set(machine: Machine, selection: Selection, room: Room, existing: Measurement | None) -> None:
-    """Refuse effects of which a plan cannot know the state: those with a memory, and inputs that nobody sets."""
+    """Refuse effects that depend on a state which a plan cannot set: NCF636 for time lags and unknown inputs."""
     late = [effect for effect in selection.estimated if effect.time_constant_s]
     if late:
         text = f"{late[0].name} follows {late[0].input} after a time: where to stand at which hour is not planned"
@@ -149,7 +153,7 @@ def _can_be_set(machine: Machine, selection: Selection, room: Room, existing: Me
 
 
 def joined(first: Measurement, last: Measurement) -> Measurement:
-    """Two measurements of one kind as one; columns that either lacks are zero there."""
+    """Two measurements of one kind joined; a missing column is filled with zeros."""
     if first.kind != last.kind:
         text = f"the poses measured already are of kind {first.kind}, not {last.kind}"
         raise UsageError.of("NCF636", text, hint=f"--kind {first.kind}")
@@ -164,14 +168,14 @@ def joined(first: Measurement, last: Measurement) -> Measurement:
 
 
 def _values(measurement: Measurement) -> tuple[str, ...]:
-    """Measured columns that a plan does without."""
+    """Measured columns that are not part of a plan."""
     return () if measurement.kind == "probe" else measurement.measured
 
 
 def pool_of(
     seen: Observation, machine: Machine, selection: Selection, room: Room, separate: Sequence[str], seed: int
 ) -> tuple[Pool, Ints]:
-    """The candidates' rows over what can be determined at all, and which coefficients these are.
+    """The pool of candidates over the determinable coefficients, and the indices of these.
 
     In units of the noise: 1 um of a length, 10 urad of an angle.
     """
@@ -193,7 +197,7 @@ def pool_of(
 
 
 def _full_rank(nuisance: Array) -> Array:
-    """As many combinations of the set-up's columns as are independent."""
+    """Independent combinations of the columns of the set-up, (m, rank)."""
     size = np.linalg.norm(nuisance, axis=0)
     scaled: Array = nuisance[:, size > 0] / size[size > 0]
     if not scaled.shape[1]:
@@ -205,7 +209,7 @@ def _full_rank(nuisance: Array) -> Array:
 def _targets(
     machine: Machine, selection: Selection, kept: Ints, room: Room, separate: Sequence[str], seed: int
 ) -> Array:
-    """What is to be known well: the tip error over the volume, um, or the coefficients of some effects."""
+    """The combinations (t, p) to be determined well: the tip error over the volume, um, or some coefficients."""
     if separate:
         columns = [k for name in separate for k in _columns(machine, selection, name)]
         chosen = np.flatnonzero(np.isin(kept, columns))
@@ -220,7 +224,7 @@ def _targets(
 
 
 def _columns(machine: Machine, selection: Selection, name: str) -> list[int]:
-    """The coefficients of an effect by its name: of a physical effect exactly those that it is made of."""
+    """Indices of the coefficients of an effect; `name` is an ISO 230-1 name or that of a physical effect."""
     physical = library(machine).get(name)
     forms = {form(effect) for effect in physical.effects} if physical else set()
     owners = [effect for effect in selection.estimated for _ in range(effect.basis.size)]
@@ -238,8 +242,8 @@ def _columns(machine: Machine, selection: Selection, name: str) -> list[int]:
 class Pool:
     """Candidates as rows of a design.
 
-    blocks   (n, r, p) the rows of each candidate over all that is determined, set-up included, for a noise of one
-    targets  (t, p) the combinations whose variance matters
+    blocks   (n, r, p) r rows of each candidate over p determinable parameters, set-up included, for a noise of one
+    targets  (t, p) combinations whose variance is minimised
     """
 
     blocks: Array
@@ -247,12 +251,12 @@ class Pool:
 
     @cached_property
     def power(self) -> float:
-        """The mean square of all numbers in the blocks."""
+        """Mean square of the elements of `blocks`, the scale of the ridge."""
         return max(float((self.blocks**2).mean()), 1e-300)
 
 
 def choose(pool: Pool, count: int, fixed: int = 0) -> Ints:
-    """Indices of the candidates to be measured; the first `fixed` blocks are measured anyway."""
+    """Indices of `count` candidates to measure; the first `fixed` blocks are measured already."""
     inverse = np.linalg.inv(information(pool, range(fixed)))
     free = np.ones(len(pool.blocks), dtype=bool)
     free[:fixed] = False
@@ -275,7 +279,7 @@ def choose(pool: Pool, count: int, fixed: int = 0) -> Ints:
 
 
 def _exchanged(pool: Pool, start: list[int], fixed: int) -> tuple[list[int], float]:
-    """Replace one pose after another by the candidate that lowers the worst variance most; that variance."""
+    """Improve a set of poses by exchanges until the largest variance no longer falls; the set and that variance."""
     variance = variances(pool, [*range(fixed), *start])
     best, worst = list(start), float(variance.max())
     looked_at = np.zeros(len(variance), dtype=bool)
@@ -292,7 +296,7 @@ def _exchanged(pool: Pool, start: list[int], fixed: int) -> tuple[list[int], flo
 
 
 def _passed(pool: Pool, start: list[int], fixed: int) -> list[int]:
-    """One pass over all poses."""
+    """One pass of exchanges over all poses."""
     chosen = list(start)
     worst = float(variances(pool, [*range(fixed), *chosen]).max())
     measured = Measured.of(pool, [*range(fixed), *chosen])
@@ -307,11 +311,11 @@ def _passed(pool: Pool, start: list[int], fixed: int) -> list[int]:
 
 @frozen(slots=False)
 class Measured:
-    """What is known once some blocks are measured, with M their information.
+    """Products with the inverse of the information M of some measured blocks.
 
     inverse  (p, p) M^-1
-    spread   (n, r, p) B M^-1 of every candidate
-    own      (n, r, r) B M^-1 B' of every candidate
+    spread   (n, r, p) B M^-1 for the rows B of every candidate
+    own      (n, r, r) B M^-1 B' for every candidate
     """
 
     inverse: Array
@@ -320,16 +324,16 @@ class Measured:
 
     @classmethod
     def of(cls, pool: Pool, rows: Sequence[int]) -> Measured:
-        """From these blocks."""
+        """The products for the blocks with indices `rows`."""
         n, r, p = pool.blocks.shape
         inverse = np.asarray(np.linalg.inv(information(pool, rows)), dtype=np.float64)
         spread = (pool.blocks.reshape(n * r, p) @ inverse).reshape(n, r, p)
         return cls(inverse, spread, spread @ np.swapaxes(pool.blocks, 1, 2))
 
     def without(self, pool: Pool, row: int) -> Measured | None:
-        """Without one of the blocks; None where next to nothing else tells what it tells, and rounding would spoil it.
+        """The products without one of the blocks, by the Woodbury formula; None if that would be inaccurate.
 
-        By the formula of Woodbury: `spread` is what it was, and not used any more.
+        It is inaccurate if the other blocks hardly determine what this one does. `spread` is not updated.
         """
         block = pool.blocks[row]
         rest = np.eye(len(block)) - self.own[row]
@@ -344,13 +348,13 @@ class Measured:
 
 
 def best_addition(pool: Pool, others: list[int], measured: Measured | None = None) -> tuple[int, float]:
-    """The candidate that, added to the others, leaves the smallest worst variance, and that variance.
+    """The candidate that, added to the others, gives the smallest maximum of the variances; and that maximum.
 
-    measured  what is known of the others, if somebody has worked it out
+    measured  products for the others, if they are known
 
-    With the rows B of a candidate and the information M without it, a target t gains |L^-1 B M^-1 t|^2, where
-    L L' = 1 + B M^-1 B'. What a candidate leaves of the FIRST targets that are worst without it bounds what it leaves
-    of all from below: the others are worked out for the candidates that may still be best, CHUNK at a time.
+    With the rows B of a candidate and the information M without it, the variance of a target t falls by
+    |L^-1 B M^-1 t|^2, where L L' = 1 + B M^-1 B'. The maximum over the `FIRST` worst targets is a lower bound of that
+    over all targets; the latter is computed, `CHUNK` candidates at a time, only for candidates that may be best.
     """
     measured = measured or Measured.of(pool, others)
     projected = measured.inverse @ pool.targets.T
@@ -375,7 +379,10 @@ def best_addition(pool: Pool, others: list[int], measured: Measured | None = Non
 
 
 def _left(blocks: Array, white: Array, projected: Array, present: Array) -> Array:
-    """The largest variance of some targets (p, t) once each of the blocks (n, r, p) is there, (n,)."""
+    """For each added block (n, r, p), the largest remaining variance of some targets, (n,).
+
+    white (n, r, r) L^-1; projected (p, t) M^-1 t; present (t,) variances without the block
+    """
     n, r, p = blocks.shape
     cross = white @ (blocks.reshape(n * r, p) @ projected).reshape(n, r, -1)
     gain = np.square(cross, out=cross).sum(axis=1)
@@ -383,7 +390,7 @@ def _left(blocks: Array, white: Array, projected: Array, present: Array) -> Arra
 
 
 def _whitening(small: Array) -> Array:
-    """W (n, r, r) with W (1 + `small`) W' = 1; where poses leave much open, rounding makes `small` negative."""
+    """W (n, r, r) with W (1 + `small`) W' = 1; eigenvalues that rounding made negative count as zero."""
     try:
         result: Array = np.linalg.inv(np.linalg.cholesky(np.eye(small.shape[1]) + small))
     except np.linalg.LinAlgError:
@@ -393,7 +400,7 @@ def _whitening(small: Array) -> Array:
 
 
 def information(pool: Pool, rows: Sequence[int]) -> Array:
-    """The information matrix (p, p) of some blocks, with next to nothing added so that it has an inverse."""
+    """The information matrix (p, p) of the blocks `rows`, with a small ridge that makes it regular."""
     p = pool.blocks.shape[2]
     stacked = pool.blocks[list(rows)].reshape(-1, p)
     return stacked.T @ stacked + RIDGE * np.eye(p) * pool.power
@@ -409,7 +416,7 @@ def variances(pool: Pool, rows: Sequence[int]) -> Array:
 
 
 def skeleton(plan: Measurement, machine: Machine) -> str:
-    """G-code in machine coordinates, one stop a pose; each axis comes from the side that the plan asks for."""
+    """G-code in machine coordinates with one stop per pose; each axis approaches from the side that the plan states."""
     lines = [
         "%",
         f"(MEASUREMENT PLAN, KIND {plan.kind.upper()}, {len(plan)} POSES)",
@@ -423,7 +430,7 @@ def skeleton(plan: Measurement, machine: Machine) -> str:
 
 
 def _stop(plan: Measurement, machine: Machine, row: int) -> list[str]:
-    """Go to one pose and stop."""
+    """The blocks that approach one pose and stop there."""
     words, back = [], []
     for axis in machine.axes:
         column = READ[axis.name] if axis.name in READ and READ[axis.name] in plan.columns else axis.name

@@ -1,7 +1,7 @@
-"""Measurement files: text to `Measurement`, with every fault of the file named at once.
+"""Reader of measurement files: text to `Measurement`, with all faults of the file reported at once.
 
-The text is split into a head (lines `# key: value`), the names of the columns, and rows of cells; each is read with its
-faults noted. What is well formed but odd is looked at afterwards, in `ncfix.measure.checks`.
+The text has a head (lines `# key: value`), a line of column names, and rows of cells. Well-formed but implausible
+contents are checked afterwards, in `ncfix.measure.checks`.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from ncfix.toml_text import LARGEST, did_you_mean
 from ncfix.values import mutable
 
 SHOWN = 25
-"""Faults that are named one by one; a file with more has a fault of another sort."""
+"""Largest number of faults that are reported one by one."""
 VERSION = 1
 NUMBERS = {"noise_um": 1, "noise_urad": 1, "point": 3}
-"""Header lines that are so many numbers."""
+"""Header key -> number of numbers in its value."""
 ONCE = ("ncfix-measurement", "kind", "noise_um", "noise_urad", "point", "frame", "setup", "sense", "carried_by")
-"""Header lines of which there can only be one."""
+"""Header keys that may occur only once."""
 NAMED = {"distance": (2, 2), "target": (1, 3)}
-"""Header lines that are names and then numbers: `distance: 1 2 304.6686 0.0012`."""
+"""Header key -> numbers of names and of numbers in its value, such as `distance: 1 2 304.6686 0.0012`."""
 COMMA = re.compile(r"[-+]?\d+,\d+")
 LABELS = ("set", "repeat")
-"""Columns of labels that any kind may have."""
+"""Columns of labels that every kind may have."""
 
 
 def read(path: str, machine: Machine, plan: bool = False) -> Measurement:
@@ -43,13 +43,13 @@ def read(path: str, machine: Machine, plan: bool = False) -> Measurement:
 
 
 def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bool = False) -> Measurement:
-    """The measurement in a text, of this machine.
+    """The measurement in a text, for this machine.
 
-    plan  the file is a plan to be filled in: measured columns may be missing or empty. Empty ones are left out; where a
-          kind has some of its columns or others, they are NaN, since they say which of them will be filled in.
+    plan  the file is a plan to be filled in: measured columns may be missing or empty. Empty ones are dropped, except
+          for kinds with a choice of measured columns: there they are NaN, and state which will be filled in.
 
-    Raises `ConfigError` with NCF600 ... NCF616, all faults at once. Instruments' own formats are recognised by what
-    they look like, see `ncfix.measure.foreign`.
+    Raises `ConfigError` with NCF600 ... NCF616, all faults at once. Formats of instruments are recognised by their
+    content, see `ncfix.measure.foreign`.
     """
     text = plain_text(source)
     found = foreign.recognised(text, machine, path) if text is not None and not text.startswith("#") else None
@@ -66,7 +66,9 @@ def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bo
 
 
 def _sensed(measurement: Measurement, machine: Machine) -> Measurement:
-    """Positioning in the sense of bodies, whatever the head says; where it says nothing of a table axis, a remark."""
+    """The measurement with positioning errors converted to the sense of the body (header `sense`); with a remark if a
+    table axis is affected and the header does not state the sense.
+    """
     if "value" not in measurement.columns:
         return measurement.with_header("sense", "body")  # a plan, which is filled in so
     if measurement.header("sense") == "axis":
@@ -102,7 +104,7 @@ def _measurement(text: MeasurementLines, machine: Machine, plan: bool) -> Measur
 
 
 def _open_end(text: MeasurementLines, last: list[Cell]) -> tuple[Message, ...]:
-    """A remark if the last number of the file has fewer decimals than all above it, and no line end behind."""
+    """Remark NCF619 if the file may be cut off: no line end, and fewer decimals in the last number than above it."""
     decimals = [len(re.sub(r"^[^.,]*[.,]?", "", cell.text)) for cell in last]
     if not text.open_end or len(last) < 2 or decimals[-1] >= min(decimals[:-1]):
         return ()
@@ -113,7 +115,7 @@ def _open_end(text: MeasurementLines, last: list[Cell]) -> tuple[Message, ...]:
 
 @mutable
 class MeasurementLines:
-    """The lines of a file and what is wrong with them."""
+    """The lines of a file and the faults noted so far; open_end: the last line has no line end."""
 
     path: str
     lines: list[str]
@@ -131,7 +133,7 @@ class MeasurementLines:
         self.note(code, text, cell.line, cell.column, hint)
 
     def stop(self) -> None:
-        """Raise what was noted, if anything."""
+        """Raise `ConfigError` with all noted faults, if there are any."""
         if self.messages:
             self.messages.sort(key=lambda each: (each.place.line, each.place.column) if each.place else (0, 0))
             more = len(self.messages) - SHOWN
@@ -143,7 +145,7 @@ class MeasurementLines:
 
 
 def _header_lines(text: MeasurementLines) -> list[tuple[Cell, Cell]]:
-    """The header lines before the columns; a comment without a colon is one for people."""
+    """Key and value cells of the header lines above the columns; comments without a colon are skipped."""
     pairs = []
     for number, line in enumerate(text.lines, 1):
         if line.strip() and not line.startswith("#"):
@@ -156,7 +158,7 @@ def _header_lines(text: MeasurementLines) -> list[tuple[Cell, Cell]]:
 
 
 def _note_stray(text: MeasurementLines, start: int, kind: str) -> None:
-    """Note header lines after the first `start` lines: there they would be taken for a comment."""
+    """Note header lines below the first `start` lines, where they would be ignored as comments."""
     for number, line in enumerate(text.lines[start:], start + 1):
         key, colon, _ = line.removeprefix("#").partition(":")
         if line.startswith("#") and colon and key.strip() in (*COMMON, *KINDS[kind].headers):
@@ -165,7 +167,7 @@ def _note_stray(text: MeasurementLines, start: int, kind: str) -> None:
 
 
 def _kind_of(text: MeasurementLines, pairs: list[tuple[Cell, Cell]]) -> str:
-    """The kind; what is wrong with version and kind is noted."""
+    """The kind of the measurement; faults of version and kind are noted."""
     found = {key.text: value for key, value in pairs}
     version = found.get("ncfix-measurement")
     if version is None:
@@ -187,7 +189,7 @@ def _kind_of(text: MeasurementLines, pairs: list[tuple[Cell, Cell]]) -> str:
 
 
 def _kinds_by_columns(text: MeasurementLines) -> str:
-    """Of which kind a table looks by the names of its columns; "" if of none."""
+    """The kind that a table seems to have by its column names; "" if none."""
     line = next((line for line in text.lines if line.strip() and not line.startswith("#")), "")
     names = {cell.text for cell in SeparatedText.of(line).cells(line, 1)}
     fits = [form for form in KINDS.values() if names & {*form.measured} and names >= {*form.required}]
@@ -195,7 +197,7 @@ def _kinds_by_columns(text: MeasurementLines) -> str:
 
 
 def _check_header(text: MeasurementLines, pairs: list[tuple[Cell, Cell]], kind: str) -> None:
-    """Note unknown keys and values that cannot be."""
+    """Note unknown keys and invalid values of header lines."""
     known = (*COMMON, *KINDS[kind].headers)
     said: set[str] = set()
     for key, value in pairs:
@@ -246,7 +248,7 @@ def _finite(text: str) -> float | None:
 def _check_names(
     text: MeasurementLines, names: list[Cell], form: MeasurementKind, machine: Machine, plan: bool
 ) -> None:
-    """Note columns that are unknown, there twice, or missing; a plan lacks what will be measured."""
+    """Note columns that are unknown, repeated, or missing; a plan may lack the measured ones."""
     known = {*machine.axis_names, *form.columns, *form.labels, *LABELS, *machine.inputs, "tool_length", "time_s"}
     known |= {f"dir_{axis}" for axis in machine.axis_names}
     seen: set[str] = set()

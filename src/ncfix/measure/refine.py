@@ -1,14 +1,14 @@
-"""A model made to fit its data: which coefficients stay in it, and how late effects follow their inputs.
+"""Refinement of a model: removal of insignificant coefficients, and estimation of time constants.
 
-Stepwise regression (Soons 1993, section 3.3): coefficients that cannot be told from zero are taken out, one at a time.
-The least significant one goes first; one that went comes back if it has become significant. A coefficient that is out
-is zero; one that the measurements cannot tell stays at what the machine file says. Tests are two-sided t-tests with the
-noise that the residuals show. What is out is not known to be zero: the covariance of the others is that of all with
-what is out at zero give or take what such errors are, and with how far taking it out has moved the others.
+Stepwise regression (Soons 1993, section 3.3): coefficients not significantly different from zero are removed one at a
+time, the least significant first; a removed one returns if it becomes significant. A removed coefficient is zero; one
+that the data do not determine keeps the value of the machine file. Tests are two-sided t-tests with the noise of the
+residuals. Since removed coefficients are not known to be zero, the covariance of the others includes them with zero
+mean and a usual size, and the change that their removal has caused.
 
 Time constants (section 2.7): an effect with a lag is linear in its coefficients once its time constant is known. So
-only the constants are searched for, on a coarse scale of times first and then by descent, with all else solved for at
-each try (variable projection).
+only the time constants are searched, first on a coarse grid and then by descent, with all other parameters solved for
+at each try (variable projection).
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from ncfix.measure.measurement import Measurement
 from ncfix.measure.selection import Selection, labels_of
 
 SCALE = 24
-"""Time constants tried first, from the shortest step of time to three times the whole."""
+"""Number of time constants of the coarse grid, from a third of the time step to three times the duration."""
 USUAL = 1 / 3
-"""Standard deviation of an error that was left out, of what is much."""
+"""Standard deviation of a removed error, in units of a large one (`plausible.much`)."""
 STEP = 1e-3
-"""Relative change of a time constant that is none."""
+"""Relative accuracy of a time constant."""
 
 
 def pruned(problem: Problem, estimate: Estimate, level: float, loss: str) -> tuple[Problem, Estimate, tuple[str, ...]]:
-    """The problem with only the coefficients that are significant at this level, its solution, and what is left out."""
+    """The problem with the coefficients significant at `level` only, its solution, and names of the removed ones."""
     chosen = _significant(problem, estimate, 1 - level)
     if chosen.all():
         return problem, estimate, ()
@@ -50,8 +50,11 @@ def pruned(problem: Problem, estimate: Estimate, level: float, loss: str) -> tup
 
 
 def _covariance(problem: Problem, estimate: Estimate, stays: Mask, found: Estimate) -> Array:
-    """Of all coefficients of a problem about those `found` without some of them, for a noise of one, (p, p)."""
-    told = np.flatnonzero(stays)[found.solution.kept]  # one that was held beside what went may be told now
+    """Covariance (p, p) of all coefficients of a problem about the values `found` without the removed ones.
+
+    stays  (p,) mask of the coefficients of the reduced problem. The noise is one.
+    """
+    told = np.flatnonzero(stays)[found.solution.kept]  # may include one that was held before the removal
     kept, scale = np.union1d(estimate.solution.kept, told), noise_scale(problem, estimate) or 1.0
     design, target = _alone(problem, estimate, kept)
     usual = USUAL * problem.limits[kept] / HOPELESS
@@ -69,7 +72,7 @@ def _covariance(problem: Problem, estimate: Estimate, stays: Mask, found: Estima
 
 
 def _left_out(selection: Selection, chosen: Mask) -> Iterator[str]:
-    """The coefficients that `_without` leaves out, by their names; an effect of which nothing stays by its own."""
+    """Names of the coefficients that `_without` removes; an effect removed as a whole is named once."""
     at = 0
     for effect in selection.estimated:
         keep = chosen[at : at + effect.basis.size]
@@ -83,7 +86,7 @@ def _left_out(selection: Selection, chosen: Mask) -> Iterator[str]:
 
 
 def _significant(problem: Problem, estimate: Estimate, risk: float) -> Mask:
-    """Which coefficients stay, by backward elimination with a look back after each step."""
+    """Mask of the coefficients that stay, by backward elimination with re-entry; `risk`: significance probability."""
     inside = np.zeros(len(estimate.coefficients), dtype=np.bool_)
     inside[estimate.solution.kept] = True
     held = ~inside & (estimate.coefficients != 0)
@@ -105,7 +108,7 @@ def _significant(problem: Problem, estimate: Estimate, risk: float) -> Mask:
 
 
 def _whole(selection: Selection, chosen: Mask) -> Mask:
-    """What stays, with the rest of what cannot be taken apart."""
+    """The chosen coefficients, plus the others of effects whose basis cannot be reduced."""
     stays, at = chosen.copy(), 0
     for effect in selection.estimated:
         part = slice(at, at + effect.basis.size)
@@ -115,7 +118,7 @@ def _whole(selection: Selection, chosen: Mask) -> Mask:
 
 
 def _alone(problem: Problem, estimate: Estimate, kept: Ints) -> tuple[Array, Array]:
-    """What coefficients show beside the set-up, and what those of them have to explain that are `kept`, in noises."""
+    """Design and target of the coefficients `kept`, orthogonal to the set-up, in units of the noise."""
     root, basis = np.sqrt(estimate.weight) / problem.sigma, estimate.solution.nuisance
     asked = np.zeros(len(estimate.coefficients))
     asked[kept] = estimate.coefficients[kept]
@@ -124,7 +127,10 @@ def _alone(problem: Problem, estimate: Estimate, kept: Ints) -> tuple[Array, Arr
 
 
 def _chances(design: Array, target: Array, start: int) -> tuple[Array, Array]:
-    """The probability of each estimate by chance, and the residual."""
+    """Probability by chance of each estimate (two-sided t-test), and the residual.
+
+    start  degrees of freedom before the coefficients are fitted
+    """
     orthogonal, triangle = np.linalg.qr(design)
     inverse = np.linalg.inv(triangle)
     value = inverse @ (orthogonal.T @ target)
@@ -136,7 +142,7 @@ def _chances(design: Array, target: Array, start: int) -> tuple[Array, Array]:
 
 
 def _best_outside(design: Array, left: Array, inside: Mask, start: int, banned: set[int]) -> tuple[int, float] | None:
-    """The coefficient outside that would be most significant, once each."""
+    """The removed coefficient that would be most significant if added, with its probability; each returns only once."""
     orthogonal, _ = np.linalg.qr(design[:, inside])
     best: tuple[int, float] | None = None
     for k in np.flatnonzero(~inside):
@@ -154,7 +160,7 @@ def _best_outside(design: Array, left: Array, inside: Mask, start: int, banned: 
 
 
 def _without(problem: Problem, chosen: Mask) -> Problem:
-    """This problem without the coefficients that are not chosen."""
+    """The problem without the coefficients that are not chosen."""
     effects: list[Effect] = []
     free: list[bool] = []
     at = 0
@@ -171,7 +177,7 @@ def _without(problem: Problem, chosen: Mask) -> Problem:
 
 
 def _reduced(effect: Effect, keep: Mask) -> Effect | None:
-    """The effect with fewer powers or knots; None if nothing is left of it. Other bases stay whole if any part does."""
+    """The effect with the powers or knots in `keep` only; None if none is left. Other bases are kept as a whole."""
     if not keep.any():
         return None
     if keep.all() or not isinstance(effect.basis, Polynomial | Truncated):
@@ -190,10 +196,10 @@ def _reduced(effect: Effect, keep: Mask) -> Effect | None:
 def with_time_constants(
     measurements: Sequence[Measurement], machine: Machine, selection: Selection
 ) -> tuple[Selection, tuple[Message, ...]]:
-    """The selection with time constants that fit best, and these in words, with their standard deviations.
+    """The selection with the best time constants of its estimated effects, and messages with these and their sigmas.
 
-    Of the effects that are estimated and have one; effects that share one keep to it. Raises `UsageError` NCF639 if no
-    effect lags, or nothing tells the time.
+    Effects with equal time constants keep them equal. Raises `UsageError` NCF639 if no effect has a time constant, or
+    no time was logged.
     """
     from scipy.optimize import minimize
 
@@ -204,7 +210,7 @@ def with_time_constants(
     low, high = _times(measurements)
 
     def left(logs: Array) -> float:
-        """The squares that are left, in units of the noise, all coefficients and the set-up solved for."""
+        """Sum of squared residuals, in units of the noise, with coefficients and set-up solved for."""
         tried = _with(selection, constants, np.exp(logs))
         problem = Problem.of(measurements, machine.replace(effects=tried.effects), tried)
         residual = problem.residual(tried.start, problem.start) / problem.sigma
@@ -225,7 +231,7 @@ def with_time_constants(
 
 
 def _times(measurements: Sequence[Measurement]) -> tuple[float, float]:
-    """The shortest and longest time constants that measured times can tell."""
+    """The shortest and longest time constants that the measured times resolve, s."""
     times = [np.unique(each.columns["time_s"]) for each in measurements if "time_s" in each.columns]
     spans = [float(np.ptp(each)) for each in times if len(each) > 1]
     if not spans:
@@ -235,7 +241,7 @@ def _times(measurements: Sequence[Measurement]) -> tuple[float, float]:
 
 
 def _with(selection: Selection, constants: Sequence[float], values: Array) -> Selection:
-    """The selection with other time constants."""
+    """The selection with the time constants `constants` replaced by `values`, s."""
     new = dict(zip(constants, values.tolist(), strict=True))
     effects = tuple(
         replace(effect, time_constant_s=new[effect.time_constant_s])
@@ -247,7 +253,7 @@ def _with(selection: Selection, constants: Sequence[float], values: Array) -> Se
 
 
 def _sigma(left: Callable[[Array], float], best: Array, k: int, least: float) -> float:
-    """The relative standard deviation of a constant, from how the squares grow beside the minimum."""
+    """Relative standard deviation of time constant k, from the curvature of the sum of squares at its minimum."""
     step = np.zeros(len(best))
     step[k] = 0.05
     curvature = (left(best + step) + left(best - step) - 2 * least) / 0.05**2

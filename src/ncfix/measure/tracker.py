@@ -1,16 +1,16 @@
-"""Kind `points`: targets on the spindle head or the table, seen from an instrument that stands on the foundation.
+"""Kind `points`: targets on spindle head or table, read by an instrument that stands on the foundation (laser tracker).
 
-A laser tracker reads x = Q (B p) + s: p the target's place on its body, B the body's real pose in the base frame, Q and
-s how the instrument stands. Places and stand are unknown. Three or more targets show all six errors of a body.
+A reading is x = Q (B p) + s, with p the position of the target on its body, B the actual pose of the body in the base
+frame, and Q, s the rotation and position of the instrument. p, Q and s are unknown. Three or more targets show all six
+errors of a body.
 
-Places are those in the base frame with all axes at zero. A target that the tool carries is there with the tool of its
-first row; a longer one moves it away from the spindle along the tool. One on the spindle head stays where it is.
+Positions of targets are those in the base frame with all axes at zero. For a target that the tool carries this is with
+the tool of its first row; a longer tool moves it away from the spindle. A target on the spindle head does not move.
 
-Before any error is known, `register` finds how the instrument stands and where its targets are. Every reading is
-x = Q (R p + t) + s: R and t the nominal pose of the body. For a turn Q that is given, places and shifts follow from
-linear equations; from there Gauss-Newton steps lead to the nearest turn that explains the readings. An instrument may
-stand any way round, so the steps start from all 24 turns that take coordinate axes to coordinate axes; no turn is more
-than 63 degrees from all of them.
+`register` finds Q, s and p for a perfect machine with the nominal poses of the body. For a given rotation, positions
+and shifts follow from linear equations; Gauss-Newton steps then lead to the nearest rotation that explains the
+readings. Since an instrument may stand in any orientation, the steps start from the 24 rotations that permute the
+coordinate axes; every rotation is within 63 degrees of one of them.
 """
 
 from __future__ import annotations
@@ -40,32 +40,32 @@ from ncfix.measure.observation import (
 from ncfix.values import frozen
 
 STEPS = 40
-"""Gauss-Newton steps from one start; a good one takes some ten."""
+"""Largest number of Gauss-Newton steps from one start; a good start needs about ten."""
 STRIDE = 0.5
-"""rad: how far one step may turn an instrument, since the equations are linear for small turns only."""
+"""Largest rotation of the instrument by one step, rad, since the equations are linear for small angles only."""
 ENOUGH = 120
-"""Readings of a set that the search for its turn looks at."""
+"""Number of readings of a set that are used to find its rotation."""
 TOLD = 0.02
-"""Share of what the readings scatter that each part of a turn must show, to be found by linear equations."""
-NEAR = 3e-3
-"""A turn that leaves less than this of what the readings scatter is not looked for any further."""
+"""Smallest relative singular value at which linear equations determine the rotation."""
+FOUND_SHARE = 3e-3
+"""Residual, as a share of the scatter of the readings, at which the search for a rotation ends."""
 ROUGHLY = 1e-3
-"""Share by which a step must help while a turn is looked for."""
+"""Smallest relative decrease of the rms by a step during the search."""
 CLEARLY = 0.5
-"""A later start replaces an earlier one if it leaves less than this of its rms."""
+"""A later start replaces an earlier one if its rms is below this share of the earlier rms."""
 CHEAP = 1e5
-"""A shift of the instrument is this much likelier than one of the targets, where the readings leave the choice."""
+"""Scale of a shift of the instrument relative to that of targets, if the readings do not determine which has moved."""
 FIRM = 1e-2
-"""A target whose place the header has moves this much less than one whose place nobody said, for the same reason."""
+"""Scale of a target with a stated position relative to that of other targets, likewise."""
 OPEN = 1e-9
-"""Combinations that the readings show this much less than the best are left as they are."""
+"""Relative singular value below which a combination is undetermined and left unchanged."""
 READ = ("x", "y", "z")
 STOOD = 0.02
-"""rad: how far the instrument may be turned against the base, in simulations."""
+"""Standard deviation of the rotation of the instrument against the base in simulations, rad."""
 
 
 class Targets(Observation):
-    """Rows of target, x y z."""
+    """Observation of kind `points`: rows of target, x y z."""
 
     def __init__(self, measurement: Measurement, machine: Machine) -> None:
         super().__init__(measurement, machine)
@@ -84,18 +84,18 @@ class Targets(Observation):
         self.instrument_from_base, self.places = self._first_guess(stated)
 
     def _other_axes(self) -> dict[str, Array]:
-        """The axes of the other branch, which errors of this one may depend on, as inputs in the file's units."""
+        """Positions of the axes of the other branch, mm or degree, as inputs of errors of this branch."""
         others = [k for k in range(len(self.machine.axes)) if k not in self.axes]
         return {self.machine.axes[k].name: self.q[:, k] / self.machine.axes[k].unit for k in others}
 
     @property
     def components(self) -> tuple[str, ...]:
-        """The instrument's x y z."""
+        """See `Observation`: x y z of the instrument."""
         return READ
 
     @cached_property
     def unknowns(self) -> Unknowns:
-        """Places of the targets on their body; stand of the instrument per set, as a shift and a small turn."""
+        """Positions of the targets on their body; position and small rotation of the instrument per set."""
         return Unknowns.joined(
             [
                 Unknowns.vectors("place of target ", self.names, self.places, spread=1.0),
@@ -115,7 +115,7 @@ class Targets(Observation):
         return replace(self.sights, poses=poses).seen(places, turned, shifts).ravel()
 
     def design(self, effects: Sequence[Effect]) -> Array:
-        """See `Observation`; the errors of the other branch are not seen."""
+        """See `Observation`; errors of the other branch have no effect."""
         joints = {axis.name for axis in self.body.axes} | (set() if self.side == WORKPIECE else {"S"})
         parts = [np.zeros((3 * len(self.measurement), 0))]
         for effect in effects:
@@ -153,13 +153,13 @@ class Targets(Observation):
         return parts[0], parts[1], parts[2]
 
     def _base_from_body(self, poses: Array) -> Array:
-        """base_from_body of poses (n, 4, 4) of each row's tip; with all axes at zero places are those in the base."""
+        """base_from_body (n, 4, 4) for nominal or actual poses (n, 4, 4) of the branch; identity at axis zero."""
         tips = self.first_tip[self.index] if self.side == TOOL else self.body.tool.tip(self.lengths)
         shifted: Array = poses @ se3.shift(-tips)
         return se3.inverse(shifted) if self.side == WORKPIECE else shifted
 
     def _columns(self, effect: Effect) -> Array:
-        """What one effect moves, seen from the instrument at its first guess: (m, k)."""
+        """Derivatives (m, k) of the readings by the coefficients of one effect, at the first guess of the set-up."""
         error = self.body.design(self.own, self.own_state, [effect])
         places = self.places[self.index]
         at = self.body.nominal(self.own, self.lengths)[:, :3, 3]
@@ -173,12 +173,12 @@ class Targets(Observation):
         return seen.reshape(-1, seen.shape[-1])
 
     def _stated(self) -> dict[str, list[float]]:
-        """Where targets are nearly, by name, mm, as the header has it."""
+        """Approximate positions of targets, name -> x y z, mm, by the header."""
         lines = [text.split() for text in self.measurement.all_headers("target")]
         return {name: [float(each) for each in numbers] for name, *numbers in lines}
 
     def _first_guess(self, stated: dict[str, list[float]]) -> tuple[Array, Array]:
-        """Stand per set (s, 4, 4) and places (t, 3): from the header, and from a perfect machine's motions."""
+        """instrument_from_base per set (s, 4, 4) and target positions (t, 3), from header and `register`."""
         likely = self.first_tip if self.side == TOOL else np.zeros_like(self.first_tip)
         places = np.array([stated.get(name, place) for name, place in zip(self.names, likely.tolist(), strict=True)])
         if not all(name in self.measurement.columns for name in READ):
@@ -193,9 +193,11 @@ class Targets(Observation):
 
 @frozen(slots=False)
 class Sights:
-    """What belongs to each of n readings: base_from_body (n, 4, 4), and the numbers of the target and of the set.
+    """The geometry of n readings.
 
-    known  (t,) of which targets the header says nearly where they are
+    poses   (n, 4, 4) base_from_body
+    target  (n,) index of the target; sets (n,): index of the set
+    known   (t,) mask of the targets with a position in the header
     """
 
     poses: Array
@@ -204,16 +206,16 @@ class Sights:
     known: Mask
 
     def base(self, places: Array) -> Array:
-        """Where the targets are in the base frame, places (t, 3) -> (n, 3)."""
+        """Position of the target of each reading in the base frame, (n, 3), for target positions (t, 3)."""
         turned: Array = np.einsum("nij,nj->ni", self.poses[:, :3, :3], places[self.target])
         return turned + self.poses[:, :3, 3]
 
     def seen(self, places: Array, turns: Array, shifts: Array) -> Array:
-        """What instruments with these turns (s, 3, 3) and shifts (s, 3) read, (n, 3)."""
+        """Readings (n, 3) of instruments with rotations `turns` (s, 3, 3) and shifts (s, 3)."""
         return np.einsum("nij,nj->ni", turns[self.sets], self.base(places)) + shifts[self.sets]
 
     def design(self, places: Array, turns: Array) -> Array:
-        """Derivatives of the readings by places, shifts and small further turns, (3 n, 3 t + 6 s)."""
+        """Derivatives of the readings by positions, shifts and small further rotations, (3 n, 3 t + 6 s)."""
         n, t, s = len(self.poses), len(places), len(turns)
         turned = turns[self.sets]
         parts = [
@@ -224,9 +226,9 @@ class Sights:
         return np.concatenate(parts, axis=2).reshape(3 * n, -1)
 
     def left_open(self, places: Array, turns: Array) -> Array:
-        """Changes of places, shifts and turns that no reading shows, places that are known apart: rows (k, 3 t + 6 s).
+        """Changes of positions, shifts and rotations that no reading shows, (k, 3 t + 6 s); known positions are fixed.
 
-        In each of them the target that moves most moves by `LEVER`.
+        Each is scaled so that the largest motion of a target is `LEVER`.
         """
         free = np.concatenate([np.repeat(~self.known, 3), np.ones(6 * len(turns), dtype=bool)])
         design = self.design(places, turns)[:, free]
@@ -240,13 +242,13 @@ class Sights:
         return changes[moving] * (LEVER / most[moving])[:, None]
 
     def of_set(self, number: int) -> tuple[Sights, Ints]:
-        """Some readings of one set, as if there were no other, and which these are."""
+        """At most `ENOUGH` readings of one set, as the only set, and their indices."""
         rows = np.flatnonzero(self.sets == number)
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, ENOUGH).astype(int))]
         return Sights(self.poses[rows], self.target[rows], np.zeros(len(rows), int), self.known), rows
 
     def step(self, places: Array, turns: Array, gap: Array, turning: bool = True) -> Array:
-        """The least change of places, shifts and, if `turning`, turns that explains a gap (n, 3) in the readings."""
+        """The least change of positions, shifts and, if `turning`, rotations that explains `gap` (n, 3) best."""
         scale = np.repeat([CHEAP, 1.0], 3 * len(turns))
         scale = np.concatenate([np.repeat(np.where(self.known, FIRM, 1.0), 3), scale])
         columns = len(scale) if turning else len(scale) - 3 * len(turns)
@@ -256,7 +258,7 @@ class Sights:
 
 @frozen(slots=False)
 class Registration:
-    """Places (t, 3) of the targets, turns (s, 3, 3) and shifts (s, 3) of the instrument, and the rms they leave."""
+    """Positions (t, 3) of the targets, rotations (s, 3, 3) and shifts (s, 3) of the instrument, and the rms, mm."""
 
     places: Array
     turns: Array
@@ -265,15 +267,16 @@ class Registration:
 
     @property
     def instrument_from_base(self) -> Array:
-        """Per set, (s, 4, 4)."""
+        """Pose of the base in the instrument's frame, per set, (s, 4, 4)."""
         return se3.rigid(self.turns, self.shifts)
 
 
 def register(sights: Sights, readings: Array, places: Array, along_base: bool) -> Registration:
-    """Where the instrument stood in each set and where the targets are, from the motions of a perfect machine.
+    """Registration of the instrument in each set and of the targets, for a perfect machine.
 
-    `places` (t, 3) is where the targets are nearly, mm, of those that are known; what the readings leave open stays as
-    it is there. `along_base`: the instrument's axes are nearly those of the base.
+    readings    (n, 3) mm
+    places      (t, 3) approximate target positions, mm; undetermined combinations keep these values
+    along_base  the instrument's axes are nearly parallel to those of the base
     """
     arrays = sights.poses, sights.target, sights.sets, sights.known, readings, places
     return _registered(_Same(b"".join(each.tobytes() for each in arrays), sights, readings, places, along_base))
@@ -281,7 +284,7 @@ def register(sights: Sights, readings: Array, places: Array, along_base: bool) -
 
 @frozen(eq=False, slots=False)
 class _Same:
-    """What is asked, told apart by its numbers: files are asked again and again with other errors of the machine."""
+    """Cache key of `register`, compared by the bytes of its arrays: the same file is registered again and again."""
 
     numbers: bytes
     sights: Sights
@@ -290,11 +293,11 @@ class _Same:
     along_base: bool
 
     def __eq__(self, other: object) -> bool:
-        """Whether the same is asked."""
+        """Whether both have the same arguments."""
         return isinstance(other, _Same) and (self.numbers, self.along_base) == (other.numbers, other.along_base)
 
     def __hash__(self) -> int:
-        """By the numbers."""
+        """Hash of the bytes of the arrays."""
         return hash(self.numbers)
 
 
@@ -312,13 +315,13 @@ def _registered(asked: _Same) -> Registration:
 
 
 def _turn(sights: Sights, readings: Array, places: Array) -> Array:
-    """The turn of the instrument in one set, (1, 3, 3): of all starts the one that leads nearest to the readings."""
+    """The rotation of the instrument in one set, (1, 3, 3), from the start with the smallest rms."""
     straight = _linear_turn(sights, readings)
     if straight is not None:
         found = _refined(sights, readings, _fitted(sights, readings, places, straight[None]), ROUGHLY)
         return found.turns
     best: Registration | None = None
-    near = float(np.sqrt(np.mean((readings - readings.mean(axis=0)) ** 2))) * NEAR
+    near = float(np.sqrt(np.mean((readings - readings.mean(axis=0)) ** 2))) * FOUND_SHARE
     for start in _starts(sights, readings, places):
         found = _refined(sights, readings, _fitted(sights, readings, places, start[None]), ROUGHLY)
         if best is None or found.rms < CLEARLY * best.rms:
@@ -330,9 +333,10 @@ def _turn(sights: Sights, readings: Array, places: Array) -> Array:
 
 
 def _linear_turn(sights: Sights, readings: Array) -> Array | None:
-    """The turn (3, 3) by linear equations, where the readings tell all of it; else None.
+    """The rotation (3, 3) by linear equations if the readings determine it; else None.
 
-    W x = R p + t + r holds for W the turn back, x a reading, p and r places and shift: all of W is asked for at once.
+    The equations W x = R p + t + r, with W the inverse rotation, x a reading, p a target position and r a shift, are
+    linear in all elements of W, p and r.
     """
     n, targets = len(readings), int(sights.target.max()) + 1
     middle, spread = readings.mean(axis=0), max(float(np.ptp(readings)), 1e-9)
@@ -351,7 +355,7 @@ def _linear_turn(sights: Sights, readings: Array) -> Array | None:
 
 
 def _by(columns: Array, wanted: Array) -> Array:
-    """What of some columns (m, k) others explain."""
+    """The part of `wanted` (m, k) in the span of `columns`."""
     return columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
 
 
@@ -368,7 +372,7 @@ def _starts(sights: Sights, readings: Array, places: Array) -> Iterator[Array]:
 
 
 def _fitted(sights: Sights, readings: Array, places: Array, turns: Array) -> Registration:
-    """Places and shifts for turns that are given."""
+    """The registration with fitted positions and shifts for given rotations."""
     shifts = np.zeros((len(turns), 3))
     step = sights.step(places, turns, readings - sights.seen(places, turns, shifts), turning=False)
     places, shifts = places + step[: places.size].reshape(-1, 3), step[places.size :].reshape(-1, 3)
@@ -377,7 +381,7 @@ def _fitted(sights: Sights, readings: Array, places: Array, turns: Array) -> Reg
 
 
 def _refined(sights: Sights, readings: Array, start: Registration, less: float = 1e-6) -> Registration:
-    """The nearest registration whose rms no small change makes less by this share."""
+    """The registration improved by Gauss-Newton steps until the rms falls by less than the share `less`."""
 
     def step(at: Registration) -> tuple[Registration, float]:
         gap = readings - sights.seen(at.places, at.turns, at.shifts)
