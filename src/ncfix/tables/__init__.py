@@ -1,1 +1,1 @@
-"""Tables that controls understand, made from a machine and read back."""
+"""Compensation tables of controls: made from a machine, written, read back and run."""

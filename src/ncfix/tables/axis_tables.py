@@ -1,16 +1,15 @@
-"""Tables over one axis: of an axis over itself, sums of them over several axes, and play.
+"""Tables over one axis: of an axis over itself, sums of tables over several axes, and backlash.
 
-Of an axis over itself (`positioning`) is what a control without volumetric compensation can do (class L-POS). The value
-at a node is the mean of the exact correction over the rest of the working space, which is what leaves the least rms
-error of all that such a table can say; forward and reverse are filled apart.
+Tables of an axis over itself (`positioning`) suit controls without volumetric compensation (class L-POS). The value at
+a node is the mean of the exact correction over the other axes, which leaves the least rms error that such a table can;
+there is one table for each direction.
 
-Sums of tables (`additive`) are what a control does that has a table for each pair of an axis and an axis that it moves.
-Of all such sums the one that leaves the least rms error over a space is made of means: the table over an axis holds the
-mean of the correction over all other axes, less the mean over all of them, which is given once.
+Sums of tables (`additive`) suit controls with a table for each pair of an input and a corrected axis. The sum with the
+least rms error consists of means: the table over an axis holds the mean of the correction over all other axes, less the
+overall mean, which is added once.
 
-Play (`reversals`) is for controls that have a table or a parameter of their own for it. What the way an axis moves in
-adds to its own correction, half of it one way and half of it the other: the mean of both ways belongs into the tables
-that do not know the way.
+Backlash (`reversals`) suits controls with separate backlash tables or parameters: plus or minus half the difference of
+an axis's own correction between both directions. The mean of both directions belongs into the other tables.
 """
 
 from __future__ import annotations
@@ -36,38 +35,39 @@ from ncfix.tables.grid import Grid, projector
 from ncfix.values import frozen
 
 MEAN_POSES = 64
-"""Poses of the other axes over which a node's value is averaged: half of them, and those opposite."""
+"""Number of poses of the other axes in the mean of `positioning`: half of them, and the opposite ones."""
 OWN_FINE = 241
-"""Positions at which an axis is looked at to find how many nodes its table over itself needs."""
+"""Number of positions of an axis at which `positioning` evaluates the curve."""
 SUM_POSES = 128
-"""Poses of the other axes that a mean is taken over: half of them, and those opposite."""
+"""Number of poses of the other axes in the mean of `additive`: half of them, and the opposite ones."""
 FINE = 121
-"""Positions at which an axis is looked at."""
+"""Number of positions of an axis at which curves are evaluated."""
 RADIUS = 200.0
-"""mm: where an angle counts as much as a length."""
+"""Radius at which an angle is compared with a length, mm."""
 PLAY_POSES = 8
-"""Poses of the other axes that play is averaged over."""
+"""Number of poses of the other axes in the mean of backlash."""
 SLIGHT = 1e-5
-"""mm: a change that is none."""
+"""Smallest backlash that counts, mm."""
 SHARE = 0.1
-"""Of the target that nodes of a table of play may miss."""
+"""Share of the target that a backlash table may miss between nodes."""
 WAYS = 1000
-"""Random poses at which it is seen what the way changes in which an axis moves."""
+"""Number of random poses at which the remaining backlash is evaluated."""
 
 
 def positioning(machine: Machine, space: Array, tool_length: float, most: int, target: float) -> Compensation:
-    """A forward and a reverse table for each axis over itself; linear between nodes, held beyond the ends.
+    """A forward and a reverse table for each axis over itself; linear between nodes, constant beyond the ends.
 
-    Rotary axes get their own angular positioning error taken off, linear axes the mean of what is then left. The nodes
-    are as few as keep the line between them within `target` (mm; mm at a radius of 200 for rotary axes) of the
-    curve, and at most `most`. Axes with nothing to correct get no table.
+    Tables of rotary axes remove their own angular positioning error, those of linear axes the mean of the rest.
+    most    largest number of nodes
+    target  largest deviation between nodes, mm; for rotary axes at `RADIUS`
+    Axes without errors get no table.
     """
     half = random_poses(space, MEAN_POSES // 2, seed=11)
     rest = np.concatenate([half, space.sum(axis=1) - half])
     done = NOTHING
 
     def mean(axis: int, positions: Array, way: int) -> Array:
-        """The mean correction of an axis at its positions (n,) while it moves one way, (n,) mm or rad."""
+        """Mean correction (n,), mm or rad, of an axis at positions (n,) while it moves in direction `way`."""
         q = poses_along(axis, positions, rest)
         state = State(tool_length, np.eye(len(space))[axis] * way)
         if machine.rotary[axis]:
@@ -90,7 +90,7 @@ def positioning(machine: Machine, space: Array, tool_length: float, most: int, t
 
 
 def nodes_needed(fine: Array, curve: Array, most: int, limit: float) -> int:
-    """How many even nodes keep straight lines between them within `limit` of a curve (n,) over `fine` (n,), at most."""
+    """Number of even nodes, at most `most`, whose connecting lines are within `limit` of a curve (n,) over `fine`."""
     for count in range(2, most):
         nodes = np.linspace(fine[0], fine[-1], count)
         if np.abs(np.interp(fine, nodes, np.interp(nodes, fine, curve)) - curve).max() <= limit:
@@ -100,9 +100,10 @@ def nodes_needed(fine: Array, curve: Array, most: int, limit: float) -> int:
 
 @frozen
 class AxisTables:
-    """The tables over one axis: corrections of `outputs` at its positions `nodes`, (n_nodes, n_outputs) mm or rad.
+    """The tables over one axis.
 
-    reverse  of the axis itself while it moves towards minus, (n_nodes,); `values` then hold the other way
+    values   (n_nodes, n_outputs) corrections of `outputs` at the positions `nodes`, mm or rad
+    reverse  (n_nodes,) correction of the axis itself while it moves towards minus; `values` then hold for plus
     """
 
     input: str
@@ -112,7 +113,7 @@ class AxisTables:
     reverse: Array
 
     def grid(self, output: str) -> Grid:
-        """One of them."""
+        """The table that corrects one axis."""
         column = self.values[:, [self.outputs.index(output)]]
         return Grid((self.input,), (self.nodes,), (output,), column)
 
@@ -120,11 +121,12 @@ class AxisTables:
 def additive(
     machine: Machine, space: Array, tool_length: float, most: int, target: float, both: bool = False
 ) -> tuple[AxisTables, ...]:
-    """Tables over every axis, over the space (n_axes, 2): on itself, and on the three linear axes.
+    """Tables over every axis in the space (n_axes, 2), correcting the axis itself and the three linear axes.
 
-    Nodes are evenly spaced, at positions of four decimals (mm, degree), as few as keep straight lines between them
-    within half the target (mm; at a radius of 200 mm) and at most `most`. Rotary axes turn themselves right first.
-    `both` fills the table of an axis over itself for either way apart; else its mean serves both.
+    Nodes are evenly spaced, at positions of four decimals (mm, degree). Rotary axes first correct themselves.
+    most    largest number of nodes
+    target  twice the largest deviation between nodes, mm; for rotary axes at `RADIUS`
+    both    the table of an axis over itself differs by direction; else it holds the mean
     """
     region = Region(machine, space, tool_length)
     tables = []
@@ -152,7 +154,7 @@ def additive(
 
 @frozen
 class Region:
-    """A machine in the space (n_axes, 2) that tables are to cover, mm and rad, with a tool length, mm."""
+    """A machine with the space (n_axes, 2) that tables cover, mm and rad, and a tool length, mm."""
 
     machine: Machine
     space: Array
@@ -164,7 +166,7 @@ class Region:
         return np.linspace(low, high, count)
 
     def means(self, axis: int, way: Array | float = 0.0) -> tuple[Array, Array]:
-        """The mean correction of every axis at fine positions of one, (FINE, n_axes), and over all of them, (n_axes,).
+        """Mean correction of every axis at fine positions of one, (FINE, n_axes), and its overall mean, (n_axes,).
 
         way  (n_axes,) the directions in which axes move; 0: none
         """
@@ -178,23 +180,23 @@ class Region:
         return curve, over_all
 
     def outputs(self, axis: int, curve: Array, target: float) -> Index:
-        """The axes that tables over this one correct: itself, and those that need more than a tenth of the target."""
+        """Columns of axes that tables over this axis correct: itself, and those with more than a tenth of target."""
         needed = np.flatnonzero((np.abs(curve) * self._lever).max(axis=0) > target / 10)
         return np.union1d(needed, [axis])
 
     def nodes_needed(self, axis: int, curve: Array, outputs: Index, most: int, target: float) -> int:
-        """How many nodes keep straight lines between them within half the target of all curves, at most."""
+        """Number of nodes, at most `most`, whose connecting lines are within half the target of all curves."""
         fine = self.fine(axis)
         return max(nodes_needed(fine, curve[:, j] * self._lever[j], most, target / 2) for j in outputs)
 
     @property
     def _lever(self) -> Array:
-        """(n_axes,) mm that a unit of each axis counts for."""
+        """(n_axes,) mm per mm or rad of each axis."""
         return np.where(self.machine.rotary, RADIUS, 1.0)
 
 
 def _axis_tables(region: Region, axis: int, curve: Array, outputs: Index, nodes: Array, half: Array) -> AxisTables:
-    """The tables over an axis, by least squares to its curves (FINE, n_axes); `half` (FINE,) of the own one's play."""
+    """The tables over an axis, fitted to its curves (FINE, n_axes); half (FINE,): half of its own backlash."""
     fit = projector(region.fine(axis), nodes)
     own = int(np.flatnonzero(outputs == axis)[0])
     values = fit @ curve[:, outputs]
@@ -206,10 +208,10 @@ def _axis_tables(region: Region, axis: int, curve: Array, outputs: Index, nodes:
 
 @frozen
 class Reversal:
-    """What is added to an axis while it moves towards plus, and taken off it while it moves towards minus.
+    """The backlash correction of an axis: `half` is added while it moves towards plus, subtracted towards minus.
 
     nodes  positions of the axis, ascending, (n,) mm
-    half   there, (n,) mm
+    half   half of the backlash correction there, (n,) mm
     """
 
     axis: str
@@ -218,16 +220,16 @@ class Reversal:
 
     @property
     def whole(self) -> float:
-        """What the axis is moved by when it turns round, from minus to plus, on the average, mm."""
+        """Mean correction step of the axis at a reversal from minus to plus, mm."""
         return 2 * float(self.half.mean())
 
     def terms(self) -> tuple[Term, Term]:
-        """As tables."""
+        """The correction as a table for each direction."""
         return own_terms(self.axis, self.nodes, self.half, -self.half)
 
 
 def reversals(machine: Machine, space: Array, tool_length: float, target: float, most: int) -> tuple[Reversal, ...]:
-    """The play of every linear axis that has some, with at most so many nodes."""
+    """The backlash correction of every linear axis that has backlash, with at most `most` nodes each."""
     found = []
     for axis in linear_axes(machine):
         low, high = space[axis].tolist()
@@ -242,7 +244,7 @@ def reversals(machine: Machine, space: Array, tool_length: float, target: float,
 
 
 def reversal_note(machine: Machine, space: Array, tool_length: float, done: Compensation = NOTHING) -> Iterator[str]:
-    """What to say of play that is left; `done`: tables that take some off."""
+    """A note on the backlash that the tables `done` leave, if there is any."""
     q, ways = random_poses(space, WAYS, seed=21), random_ways(len(space), WAYS, seed=22)
     neither = np.zeros_like(ways)
     either, mean = (exact_correction(machine, q, State(tool_length, way)) for way in (ways, neither))

@@ -1,10 +1,10 @@
-"""What a set of tables does, whatever control it is for: sums of tables and of products of tables.
+"""Compensation tables independent of the control: sums of tables and of products of tables.
 
-Everything here is a correction: what is ADDED to the command of an axis, mm or rad. Signs, units and digits of a
-control's own files are the business of its plugin, which turns them into this and back.
+All values are corrections, ADDED to the command of an axis, mm or rad. Plugins convert these to the signs, units and
+digits of a control's own files, and back.
 
-The class (ISO/TR 16907) of tables says which errors they hold, by the axes that each of them looks up and corrects: not
-what a control could hold, but what was written. One table of X over itself is L-POS, whatever else there might be.
+`class_of` gives the class (ISO/TR 16907) of tables that were written, by the axes that each looks up and corrects. It
+is not what the control could hold: a single table of X over itself is L-POS.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ LINEAR = ("X", "Y", "Z")
 class Term:
     """One summand: a table, or the product of tables with the same outputs.
 
-    factors  the tables; a product takes the unit of the first, the others are plain numbers
-    way      (axis, 1 or -1): it acts only while that axis moves this way; with the way unknown it counts half
+    factors  the tables; a product has the unit of the first, the others have no unit
+    way      (axis, 1 or -1): active only while that axis moves in this direction; if the direction is unknown, half
     """
 
     factors: tuple[Grid, ...]
@@ -38,7 +38,7 @@ class Term:
         return self.factors[0].outputs
 
     def at(self, names: Sequence[str], q: Array, direction: Array) -> Array:
-        """Its contribution to its outputs, (n, n_outputs)."""
+        """Contribution to the outputs, (n, n_outputs), at commands q (n, n_axes) of axes `names`."""
         value = np.ones((len(direction), 1))
         if self.way is not None:
             axis, sense = self.way
@@ -49,7 +49,7 @@ class Term:
 
 
 def own_terms(axis: str, nodes: Array, ahead: Array, back: Array) -> tuple[Term, Term]:
-    """Tables of an axis over itself: what holds while it moves towards plus, and towards minus, (n,) each."""
+    """Tables of an axis over itself, for motion towards plus (`ahead`) and minus (`back`), (n,) each."""
     both = (Grid((axis,), (nodes,), (axis,), values[:, None]) for values in (ahead, back))
     first, second = (Term((grid,), (axis, way)) for grid, way in zip(both, (1, -1), strict=True))
     return first, second
@@ -57,13 +57,13 @@ def own_terms(axis: str, nodes: Array, ahead: Array, back: Array) -> tuple[Term,
 
 @runtime_checkable
 class Tables(Protocol):
-    """What a control does with its files: a sum of tables (`Compensation`), or whatever else it works out of them."""
+    """The correction that a control computes from its files: a sum of tables (`Compensation`), or another form."""
 
     def at(self, names: Sequence[str], q: Array, direction: Array | None = None) -> Array:
         """Corrections of all axes `names` at commands q (n, n_axes) [mm, rad], to be added to them, (n, n_axes)."""
 
     def for_tool(self, length: float) -> Tables:
-        """What it does with a tool of this length, mm, if the control takes that into account."""
+        """The tables for a tool of this length, mm, if the control takes it into account."""
 
     @property
     def grids(self) -> tuple[Grid, ...]:
@@ -75,7 +75,7 @@ class Tables(Protocol):
 
     @property
     def points(self) -> int:
-        """The nodes of all its tables."""
+        """Number of nodes of all tables."""
 
 
 @frozen
@@ -97,12 +97,12 @@ class Compensation:
         return total
 
     def for_tool(self, length: float) -> Compensation:
-        """This compensation: tables know nothing of tools."""
+        """This compensation: plain tables do not depend on the tool."""
         return self
 
     @property
     def grids(self) -> tuple[Grid, ...]:
-        """Every table in it, once: several may be multiplied by the same."""
+        """Every table, once: several products may share a factor."""
         return tuple({id(grid): grid for term in self.terms for grid in term.factors}.values())
 
     @property
@@ -122,7 +122,7 @@ NOTHING = Compensation(())
 
 @frozen
 class Lookup:
-    """An axis that a table or a product of tables corrects, over these."""
+    """An axis that a table or a product of tables corrects, and the axes that it looks up."""
 
     output: str
     inputs: frozenset[str]
@@ -144,7 +144,7 @@ def class_of(tables: Compensation, rotary: Collection[str]) -> str:
 
 
 def _linear(lines: Sequence[Lookup], all_lines: Sequence[Lookup]) -> Iterator[str]:
-    """What tables of linear axes over linear axes are: all of it, or which parts."""
+    """Classes of tables of linear axes over linear axes; `all_lines`: also those over rotary axes."""
     if any(len(line.inputs) > 1 for line in all_lines) and _reach(all_lines, ()):
         yield "L-VOL"
         return
@@ -157,7 +157,7 @@ def _linear(lines: Sequence[Lookup], all_lines: Sequence[Lookup]) -> Iterator[st
 
 
 def _reach(lines: Sequence[Lookup], rotary: Collection[str]) -> bool:
-    """Whether each axis that is corrected is so over X, Y and Z, and over a rotary axis if there are some."""
+    """Whether each corrected axis is corrected over X, Y and Z, and over a rotary axis if `rotary` has any."""
     for output in {line.output for line in lines}:
         reached = {name for line in lines if line.output == output for name in line.inputs}
         if not reached >= {*LINEAR} or (rotary and reached.isdisjoint(rotary)):

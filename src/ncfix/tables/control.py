@@ -1,10 +1,9 @@
-"""What a control's plugin brings: how its tables are made, written, read back and judged.
+"""The interface of a control's plugin: how its tables are made, written, read back and checked.
 
-A reader turns the files into `Tables`, with the control's own signs, digits, limits and rules outside the
-range worked in; running that is the emulation. A plugin registers a function that returns its `Control` with the hook
-`register_controls`, so that nothing numeric is imported before tables are asked for.
-`ncfix.testing.check_control` is the contract that any plugin must pass. What `--set` gives is text, of a form that its
-`Option` states.
+`Control.read` turns files into `Tables`, with the control's signs, digits, limits and rules beyond the range; running
+these is the emulation. A plugin registers a function that returns its `Control` with the hook `register_controls`, so
+that nothing numeric is imported before tables are asked for. Every plugin must pass `ncfix.testing.check_control`.
+Settings (`--set`) are texts of a form that their `Option` states.
 """
 
 from __future__ import annotations
@@ -29,25 +28,25 @@ Files = Mapping[str, bytes]
 
 @frozen
 class SettingForm:
-    """What the text of a setting may be: `fits` decides, `hint` says it."""
+    """The form of the text of a setting: `fits` tests a text, `hint` describes the form."""
 
     hint: str
     fits: Callable[[str], bool]
 
 
 def one_of(*words: str, hint: str = "") -> SettingForm:
-    """One of some words."""
+    """The form of a setting that is one of some words."""
     return SettingForm(hint or f"one of {', '.join(words)}", lambda text: text in words)
 
 
 def whole(low: int, high: int) -> SettingForm:
-    """A whole number within limits."""
+    """The form of a setting that is a whole number within limits."""
     hint = f"a whole number from {low} to {high}"
     return SettingForm(hint, lambda text: text.isascii() and text.isdigit() and low <= int(text) <= high)
 
 
 def number(low: float, high: float) -> SettingForm:
-    """A number within limits."""
+    """The form of a setting that is a number within limits."""
 
     def fits(text: str) -> bool:
         try:
@@ -59,24 +58,24 @@ def number(low: float, high: float) -> SettingForm:
 
 
 def wrong_setting(settings: Mapping[str, str], key: str, hint: str) -> UsageError:
-    """The error for a setting that cannot be, which its form alone does not show."""
+    """The error NCF485 for an invalid setting that its form alone does not exclude."""
     return UsageError.of("NCF485", f"{key}={settings[key]}", hint=hint)
 
 
 @frozen
 class Properties:
-    """What a format is, as data.
+    """Properties of a table format.
 
-    value_sign      "correction" (added), "error" (taken off) or "measured" (where the axis really is)
-    input_signal    what the tables look up: "setpoint" or "actual"
-    position_frame  where positions count from
-    unit            of values and positions
+    value_sign      "correction" (added), "error" (subtracted) or "measured" (actual position)
+    input_signal    position that the tables look up: "setpoint" or "actual"
+    position_frame  origin of positions
+    unit            unit of values and positions
     quantum         smallest step of a value in the file, mm and rad
-    extrapolation   beyond the first and last node
-    bidirectional   whether values depend on the way an axis moves
-    max_points      per table
-    max_tables      in all
-    combine         what several tables for one axis do
+    extrapolation   behaviour beyond the first and last node, in words
+    bidirectional   whether values depend on the direction of motion
+    max_points      largest number of nodes per table
+    max_tables      largest number of tables
+    combine         how several tables for one axis are combined, in words
     """
 
     value_sign: str
@@ -93,7 +92,7 @@ class Properties:
 
 @frozen
 class Assumption:
-    """Something that no public text settles: what is taken for true, and how to find out on the machine."""
+    """An assumption that no public text settles, and how to verify it on the machine."""
 
     id: str
     text: str
@@ -106,10 +105,10 @@ class Assumption:
 class Option:
     """A setting of a control, `--set name=value`.
 
-    default  None: it must be given
-    text     what it is, for people
-    form     what it may be; the default may be anything
-    settled  id of the assumption that says how to find out on the machine which value is right
+    default  default value; None: the setting must be given
+    text     description for people
+    form     form of the text; the default is always allowed
+    settled  id of the assumption that tells how to find the right value on the machine
     """
 
     default: str | None
@@ -118,20 +117,20 @@ class Option:
     settled: str = ""
 
     def odd(self, text: str) -> bool:
-        """Whether the control has no use for this text."""
+        """Whether this text is invalid for the setting."""
         return self.form is not None and text != self.default and not self.form.fits(text)
 
 
 @frozen
 class Request:
-    """What to make tables of.
+    """A request for tables.
 
-    machine      with its errors
-    space        (n_axes, 2) the positions that the tables cover, mm and rad
-    tool_length  the length for which they hold, mm
-    target       how much correction may be lost between nodes, mm
-    settings     the control's options, all of them
-    inputs       what temperatures and the like were taken to be for the machine's errors
+    machine      the machine with its errors
+    space        (n_axes, 2) positions that the tables cover, mm and rad
+    tool_length  tool length for which they hold, mm
+    target       largest error of the tables between nodes, mm
+    settings     all options of the control
+    inputs       values of temperatures and other inputs that were assumed for the machine's errors
 
     Raises `UsageError` NCF025.
     """
@@ -150,23 +149,23 @@ class Request:
 
 @frozen
 class Least:
-    """No tables of this kind leave less than `value` (mm) at the worst; `why`, in words."""
+    """Lower bound of the largest error of any tables of a kind, mm, and the reason in words."""
 
     value: float
     why: str
 
     @property
     def sentence(self) -> str:
-        """For people."""
+        """The bound as a sentence."""
         return f"No tables of this kind can leave less than {1e3 * self.value:.2f} um at the worst: {self.why}."
 
 
 @frozen
 class Written:
-    """The files of a control.
+    """The written files of a control.
 
-    notes  what could not be done as asked, in words
-    least  what no tables of this kind could do better, if that is known
+    notes  remarks on requests that could not be fulfilled
+    least  lower bound of the error of any tables of this kind, if known
     """
 
     files: Files
@@ -177,16 +176,16 @@ class Written:
 class Control(ABC):
     """A control with compensation tables of its own.
 
-    name         as in `ncfix export NAME`
-    title        for people
-    reaches      ISO/TR 16907 class of what the tables can correct at best; see `reached`
-    properties   of the format
-    assumptions  that the files rest on
-    options      `--set`
-    steps        what to do at the machine, in order
-    switch_off   how to be rid of it
-    rewrites     it has no tables, but programs that are rewritten
-    any_tool     what it does holds for tools of any length
+    name         name, as in `ncfix export NAME`
+    title        name for people
+    reaches      highest ISO/TR 16907 class that the tables can have; see `reached`
+    properties   properties of the format
+    assumptions  assumptions on which the files rest
+    options      settings, `--set`
+    steps        instructions at the machine, in order
+    switch_off   how to deactivate the tables
+    rewrites     whether it has no tables, but rewrites programs
+    any_tool     whether the correction holds for tools of any length
     """
 
     name: ClassVar[str]
@@ -206,40 +205,39 @@ class Control(ABC):
 
     @abstractmethod
     def read(self, files: Files) -> Tables:
-        """What the control does with these files; raises `ConfigError` for files that it would not load."""
+        """The tables in these files, as the control applies them; raises `ConfigError` if it would not load them."""
 
     @abstractmethod
     def lint(self, files: Files) -> tuple[Message, ...]:
-        """What is wrong or doubtful in these files, each with its place; empty if nothing is."""
+        """Messages on faults and doubtful contents of these files, with places."""
 
     def reached(self, machine: Machine, tables: Tables) -> str:
-        """The class of what was written: of sums and products of tables it shows in them, of others it is `reaches`."""
+        """ISO/TR 16907 class of tables that were written: found for sums and products, else `reaches`."""
         rotary = [axis.name for axis in machine.axes if axis.rotary]
         return class_of(tables, rotary) if isinstance(tables, Compensation) else self.reaches
 
     def knows(self, name: str, content: bytes) -> bool:
-        """Whether a file from elsewhere is of a form of this control, by what it holds; see `look`."""
+        """Whether a file from elsewhere has a format of this control, by its content; see `look`."""
         return False
 
     def look(self, files: Files) -> tuple[Message, ...]:
-        """What is wrong or doubtful in files from elsewhere, all of forms that it knows.
+        """Messages on files from elsewhere that the control `knows`.
 
-        There may be only some of a set, and nothing of what ncfix writes beside its own files.
+        The set may be incomplete, and lacks the side file of ncfix.
         """
         return self.lint(files)
 
     def probe(self, request: Request) -> Written:
-        """Small files that settle on the machine what must be said in options; raises `UsageError` NCF485 if none do.
-
-        Options without a default may be missing in the request; they are empty then.
+        """Small test files that show on the machine how options must be set; raises `UsageError` NCF485 if there are
+        none. Options without a default may be missing in the request; they are then "".
         """
         text = f"there is nothing to probe for {self.name}"
         raise UsageError.of("NCF485", text, hint="its assumptions say how to check them")
 
     def settings(self, given: Mapping[str, str], complete: bool = True) -> dict[str, str]:
-        """All options with those given.
+        """All settings, with defaults for those not given.
 
-        All that are unknown, of another form or, if `complete`, missing are named in one `UsageError` NCF485.
+        Raises one `UsageError` NCF485 for all unknown, invalid or, if `complete`, missing settings.
         """
         if faults := [*self._strange(given), *(self._missing(given) if complete else ())]:
             raise UsageError.collected(faults)
@@ -261,7 +259,7 @@ class Control(ABC):
                 yield Message("NCF485", text, hint=f"--set {key}=VALUE{self._how(option)}")
 
     def _how(self, option: Option) -> str:
-        """How to find out on the machine what a setting must be."""
+        """The end of a hint: how to find the right value of a setting on the machine; "" if not known."""
         found = [each.verify for each in self.assumptions if each.id == option.settled]
         return f"; on the machine: {found[0]}" if found else ""
 
@@ -271,31 +269,31 @@ class Control(ABC):
 
 
 class FileControl(Control):
-    """A control whose files are looked at once: it loads those in which nothing is wrong, and lints by all remarks."""
+    """A control whose `read` and `lint` share one examination of the files (`examined`)."""
 
     @abstractmethod
     def examined(self, files: Files) -> tuple[Tables | None, Sequence[Remarks]]:
-        """What the control does with these files, and remarks on each; None only where something is wrong."""
+        """The tables in these files, and remarks on each file; None only if a file has a fault."""
 
     def read(self, files: Files) -> Tables:
-        """What the control does with these files. Raises `ConfigError` NCF491."""
+        """The tables in these files. Raises `ConfigError` NCF491."""
         tables, remarks = self.examined(files)
         check_all(remarks)
         assert tables is not None
         return tables
 
     def lint(self, files: Files) -> tuple[Message, ...]:
-        """What the control would not load or would misread, and what is rarely meant."""
+        """All remarks on these files."""
         return messages_of(self.examined(files)[1])
 
 
 def controls() -> dict[str, Control]:
-    """All controls that plugins bring."""
+    """All controls of the plugins, by name."""
     return {name: _made(name, factory) for name, factory in registry("controls").items()}
 
 
 def get_control(name: str) -> Control:
-    """The control of that name; raises `UsageError` NCF480."""
+    """The control `name`; raises `UsageError` NCF480 if there is none."""
     found = registry("controls")
     if name not in found:
         known = found | {each: dialect for each, dialect in registry("dialects").items() if each in found}

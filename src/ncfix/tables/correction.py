@@ -1,8 +1,8 @@
-"""The correction that tables are made from, the working space in which they hold, and what they leave there.
+"""The exact correction from which tables are made, the space that tables cover, and the residual that they leave.
 
-The correction is exact, at any pose, by the forward model of the machine: of the linear axes that of the tool tip, of
-the rotary axes what they can do for the orientation of the tool, spin about its axis included. What tables leave is the
-error of the tool tip over random poses, with the tables off and with them on.
+The correction at a pose is exact by the forward model of the machine: linear axes correct the tool tip, rotary axes the
+orientation of the tool as far as they can, including its spin. The residual is the error of the tool tip at random
+poses, without tables and with them.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from ncfix.values import frozen
 
 SPATIAL = ("X", "Y", "Z")
 ARRIVED = 1e-7
-"""mm: nearer to the intended tip than any control can resolve."""
+"""Largest deviation from the intended tip at convergence, mm."""
 NEWTON_PASSES = 20
 ANEW = 5
-"""Passes for which a Jacobian is good: each takes the gap down by the gradient of the errors, a thousandth or so."""
+"""Passes with one Jacobian: each reduces the deviation by a factor of about a thousand, the gradient of the errors."""
 ROTARY_PASSES = 2
 Ranges = Mapping[str, tuple[float, float]]
 """Axis -> lowest and highest position, mm or rad."""
 POSES = 20_000
-"""Random poses at which is looked what tables leave."""
+"""Number of random poses of a residual."""
 
 
 def linear_axes(machine: Machine) -> list[int]:
-    """The columns of the three linear axes that take up the errors: X, Y and Z where there are more than three.
+    """Columns of the three linear axes that correct the tip: X, Y and Z if there are more than three.
 
     Raises `RefusedError` NCF481 if there are fewer, or more and X, Y or Z is not among them.
     """
@@ -47,10 +47,10 @@ def linear_axes(machine: Machine) -> list[int]:
 
 
 def exact_correction(machine: Machine, q: Array, state: State, start: Array | None = None) -> Array:
-    """What to add to commands q (n, n_axes) so that the tip goes where a perfect machine has it at q, (n, n_axes).
+    """Correction (n, n_axes), added to commands q, that brings the tip to its nominal position at q.
 
-    The linear axes are solved for by Newton's method; the rotary axes keep `start`, the correction that they have
-    already (none if not given). Raises `RefusedError` NCF482 where no such command is found.
+    The linear axes are solved for by Newton's method; the rotary axes keep the correction `start` (default zero).
+    Raises `RefusedError` NCF482 if no solution is found.
     """
     columns = linear_axes(machine)
     correction = np.zeros_like(q) if start is None else start.copy()
@@ -70,7 +70,7 @@ def exact_correction(machine: Machine, q: Array, state: State, start: Array | No
 
 
 def own_rotary_correction(machine: Machine, q: Array, state: State) -> Array:
-    """What takes off the angular positioning error of every rotary axis about its own line, (n, n_axes) rad."""
+    """Correction (n, n_axes), rad, of the angular positioning error of every rotary axis about its own line."""
     correction = np.zeros_like(q)
     for axis in np.flatnonzero(machine.rotary).tolist():
         described = machine.axes[axis]
@@ -80,11 +80,10 @@ def own_rotary_correction(machine: Machine, q: Array, state: State) -> Array:
 
 
 def rotary_correction(machine: Machine, q: Array, state: State) -> Array:
-    """What to add to the rotary axes at commands q (n, n_axes), (n, n_rotary) rad.
+    """Correction (n, n_rotary), rad, of the rotary axes at commands q (n, n_axes).
 
-    The least squares of the three angles that the tool is then wrong by: two axes cannot take off three. As in S.
-    Esmaeili Marzdashti (Polytechnique Montreal, 2021), Eq. 27 and 32, of which it is the angular part: the linear axes
-    can take off any displacement that is left.
+    It minimizes the three orientation errors of the tool, which two axes cannot remove completely: the angular part of
+    S. Esmaeili Marzdashti (Polytechnique Montreal, 2021), Eq. 27 and 32. Linear axes remove the remaining displacement.
     """
     columns = np.flatnonzero(machine.rotary)
     meant = machine.nominal(q, state.tool_length)
@@ -98,22 +97,22 @@ def rotary_correction(machine: Machine, q: Array, state: State) -> Array:
 
 
 def orientation_error(machine: Machine, q: Array, correction: Array, state: State) -> Array:
-    """By what angle the tool is wrong at commands q that are corrected, (n,) rad."""
+    """Orientation error of the tool (n,), rad, at commands q with a correction added."""
     turn = _turn(machine.actual(q + correction, state), machine.nominal(q, state.tool_length))
     return np.linalg.norm(turn, axis=0)
 
 
 def _turn(actual: Array, meant: Array) -> Array:
-    """The small rotation from frames (n, 4, 4) that are meant to the actual ones, (3, n) rad."""
+    """The small rotation (3, n), rad, from intended frames (n, 4, 4) to actual ones."""
     turn = actual[..., :3, :3] @ np.swapaxes(meant[..., :3, :3], -1, -2)
     return (turn[:, [2, 0, 1], [1, 2, 0]] - turn[:, [1, 2, 0], [2, 0, 1]]).T / 2
 
 
 def ranges_of(machine: Machine, given: Ranges | None = None) -> Array:
-    """The space that the tables cover, (n_axes, 2) mm and rad: that given, else the travel; one turn where endless.
+    """The space that the tables cover, (n_axes, 2), mm and rad: as given, else the travel, or one turn if endless.
 
-    Raises `UsageError` NCF483 for an axis that the machine does not have, a range that is empty or beyond the travel,
-    or a linear axis whose range is nowhere given.
+    Raises `UsageError` NCF483 for an unknown axis, a range that is empty or beyond the travel, or a linear axis without
+    a range.
     """
     space = np.array(machine.ranges)
     endless = machine.rotary & ~np.isfinite(space).all(axis=1)
@@ -141,17 +140,17 @@ def _wrong_range(text: str, hint: str) -> UsageError:
 
 
 def random_poses(space: Array, count: int, seed: int = 0) -> Array:
-    """Poses spread evenly over the space, (count, n_axes); the same for the same seed."""
+    """Uniformly random poses in the space, (count, n_axes); equal for equal seeds."""
     return np.random.default_rng(seed).uniform(space[:, 0], space[:, 1], size=(count, len(space)))
 
 
 def random_ways(n_axes: int, count: int, seed: int = 1) -> Array:
-    """Directions of motion at random, (count, n_axes), -1 or 1."""
+    """Random directions of motion, (count, n_axes), -1 or 1."""
     return np.random.default_rng(seed).choice([-1.0, 1.0], size=(count, n_axes))
 
 
 def even_poses(space: Array, count: int) -> Array:
-    """Poses that fill the space more evenly than those at random, (count, n_axes): a lattice of irrational steps."""
+    """Poses that fill the space evenly, (count, n_axes): a lattice with irrational steps."""
     dimensions = len(space)
     ratio = 2.0
     for _ in range(40):
@@ -185,7 +184,7 @@ class Residual:
     largest: Array
 
     def figures(self) -> dict[str, dict[str, Any]]:
-        """As `--json` has it, um; `at` is the pose with the most left, mm and degree."""
+        """Figures for `--json`, um; `at` is the pose with the largest error with tables, mm and degree."""
         worst = int(np.argmax(self.after))
         pose = np.where(self.rotary, np.degrees(self.q[worst]), self.q[worst])
         at = {name: round(float(value), 3) for name, value in zip(self.names, pose, strict=True)}
@@ -198,9 +197,9 @@ def _size(error: Array) -> dict[str, float]:
 
 
 def residual(machine: Machine, tables: Tables, space: Array, tool_length: float, count: int = POSES) -> Residual:
-    """Run the machine with the tables active over `count` random poses of the space (n_axes, 2).
+    """The residual of tables at `count` random poses of the space (n_axes, 2), with random directions of motion.
 
-    The tables see the commanded position, as controls do with setpoint inputs; every axis comes from either side.
+    The tables look up the commanded position, as controls with setpoint inputs do.
     """
     q = random_poses(space, count, seed=7)
     ways = random_ways(len(space), count, seed=8)

@@ -1,6 +1,6 @@
-"""Tables made, written, read back from what was written, and run: the residual is always that of the files.
+"""Export and emulation of tables: made, written, read back from the files, and run; the residual is that of the files.
 
-The side file beside them says which machine they are for, which files they are, and under which settings.
+A side file states the machine, the files and the settings.
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ SIDE_FILE = "ncfix-tables.json"
 SCHEMA = 1
 SHEET = "hand-over"
 CLOSE = 1e-9
-"""mm, rad: ends nearer to each other than that are the same."""
+"""Largest difference of equal range limits, mm or rad."""
 WORTH = 0.95
-"""Share of the error (rms) from which on what is left is as good as all of it."""
+"""Ratio of the rms errors after and before above which tables have next to no effect."""
 TURN = 2 * np.pi
 TURNED = 64
-"""Poses at which an endless axis is turned once more."""
+"""Number of poses at which an endless axis is checked one turn further."""
 LEVER = 100.0
-"""mm: at which an angle counts as a length."""
+"""Distance at which an angle is compared with a length, mm."""
 
 
 @frozen
 class Manifest:
-    """What is known of a set of files.
+    """The content of a side file.
 
-    control      the plugin that wrote them
-    machine      its name, and the hash of everything that matters to its correction
+    control      name of the control that wrote the files
+    machine      name of the machine; hash: of everything that affects its correction
     ranges       axis -> lowest and highest position covered, mm or degree
-    tool_length  the length that they hold for, mm
-    settings     the control's options
+    tool_length  tool length for which the tables hold, mm
+    settings     options of the control
     files        name -> SHA-256 of the content
     """
 
@@ -59,12 +59,12 @@ class Manifest:
     files: Mapping[str, str]
 
     def as_bytes(self, **more: Any) -> bytes:
-        """The file, with more that people may want to know."""
+        """The JSON text of the side file, with further fields for people."""
         fields = {name: getattr(self, name) for name in Manifest.__match_args__}
         return (json.dumps({"ncfix-tables": SCHEMA, **fields, **more}, indent=1) + "\n").encode()
 
     def changed(self, files: Mapping[str, bytes], folder: str) -> tuple[Message, ...]:
-        """Remarks on files that are not as they were written (NCF488)."""
+        """Remarks NCF488 on files that differ from what was written."""
         return tuple(
             Message("NCF488", "was changed since it was exported", Place(f"{folder}/{name}"), "export again")
             for name, expected in self.files.items()
@@ -96,7 +96,7 @@ def read_manifest(data: bytes, path: str) -> Manifest:
 
 
 def remarks_of(data: bytes) -> tuple[tuple[str, ...], Least | None]:
-    """What export remarked on the tables, and how little such tables could leave; nothing where it does not say so."""
+    """Notes of the export in a side file, and its lower bound of the error; empty and None if it has none."""
     found = json.loads(data)
     notes, least = found.get("notes"), found.get("least_um")
     texts = tuple(str(note) for note in notes) if isinstance(notes, list) else ()
@@ -107,7 +107,7 @@ def remarks_of(data: bytes) -> tuple[tuple[str, ...], Least | None]:
 
 
 def check_origin(manifest: Manifest, control: str, machine: Machine | None, path: str) -> None:
-    """Refuse tables of another control, or of another machine if one is given: raises `RefusedError` NCF487."""
+    """Refuse tables of another control, or of another machine unless that is None: raises `RefusedError` NCF487."""
     place = Place(path)
     if manifest.control != control:
         text, hint = f"these are tables for {manifest.control}, not {control}", f"ncfix emulate {manifest.control}"
@@ -122,10 +122,10 @@ def check_origin(manifest: Manifest, control: str, machine: Machine | None, path
 
 @frozen
 class ProgramWithTables:
-    """A program as a control with tables runs it, or as one without tables has it rewritten.
+    """Errors of a program with tables active, or, for a control without tables, rewritten.
 
-    before, after  the tip errors where it cuts, um: `max`, `rms`, and `where`, the line of the largest
-    remarks        why the tables do not fit it
+    before, after  tip errors where it cuts, um: `max`, `rms`, and `where`, the line of the largest
+    remarks        reasons why the tables do not fit the program
     """
 
     path: str
@@ -134,20 +134,22 @@ class ProgramWithTables:
     remarks: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """As the verbs print it with --json."""
+        """The object that commands print with --json."""
         figures = {"error_before_um": self.before, "error_after_um": self.after}
         return {"path": self.path, **figures, "remarks": self.remarks}
 
 
 @frozen(eq=False)
 class Exported:
-    """Files with what they leave.
+    """Exported or emulated files, with their residual.
 
     native   the control's own files
-    files    all: also the side file and the hand-over sheet
-    least    what no tables of this kind could do better, if that is known
-    reaches  the class of what was written
-    program  what they leave along a program, if one was given
+    files    all files, including side file and hand-over sheet
+    tables   the tables as the control reads them
+    left     the residual at random poses
+    least    lower bound of the error of any tables of this kind, if known
+    reaches  ISO/TR 16907 class of the tables
+    program  errors along a program, if one was given
     """
 
     native: Files
@@ -167,7 +169,7 @@ class Exported:
 
 
 def export(control: Control, request: Request, poses: int = POSES) -> Exported:
-    """Write the tables of a machine, read them again, and judge them by running them.
+    """Write the tables of a machine, read them back, and evaluate them by running them.
 
     Raises `RefusedError`: NCF484 for what the format cannot hold, NCF489 for corrections beyond what the machine
     allows, NCF490 for tables that leave more than there was before.
@@ -205,8 +207,9 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
 def emulate(
     control: Control, files: Files, machine: Machine, folder: str, any_machine: bool = False, poses: int = POSES
 ) -> Exported:
-    """Run files as the control would; they are those of a folder, side file included.
+    """Run the files of a folder, with its side file, as the control would.
 
+    any_machine  accept tables of another machine
     Raises `ConfigError` for files that the control would not load, `RefusedError` NCF487 for those of another machine.
     """
     if SIDE_FILE not in files:
@@ -239,7 +242,7 @@ def _read(control: Control, files: Files) -> Tables:
 
 
 def _read_again(control: Control, written: Written) -> Tables:
-    """Raises `RefusedError` NCF484 for what the control would not load: nobody has these files to look at."""
+    """Read files just written; raises `RefusedError` NCF484 if the control would not load them."""
     try:
         return _read(control, written.files)
     except ConfigError as error:
@@ -250,13 +253,13 @@ def _read_again(control: Control, written: Written) -> Tables:
 
 
 def linted(control: Control, files: Files) -> tuple[Message, ...]:
-    """What the control's linter says of files."""
+    """The messages of the control's linter on files."""
     found = called("controls", control.name, control.lint, files, gives=Iterable)
     return tuple(handed("controls", control.name, each, Message) for each in found)
 
 
 def _remarks(control: Control, request: Request, tables: Tables, left: Residual, written: Written) -> Iterator[str]:
-    """What holds for tables of any control: whether they do anything, how little they could leave, for which tool."""
+    """Notes for tables of any control: lower bound, lack of effect, range covered, inputs and tool."""
     if written.least and written.least.value > request.target / 10:
         yield written.least.sentence
     before, after = (float(np.sqrt(np.mean(each**2))) for each in (left.before, left.after))
@@ -286,7 +289,7 @@ def _remarks(control: Control, request: Request, tables: Tables, left: Residual,
 
 
 def _wrong_turn(request: Request, tables: Tables) -> Iterator[tuple[str, str]]:
-    """Endless axes of which the tables hold something else a turn further on, and where they count from."""
+    """Endless axes whose corrections differ one turn further: (name, covered range as text)."""
     names = request.machine.axis_names
     q = random_poses(request.space, TURNED)
     run = tables.for_tool(request.tool_length)

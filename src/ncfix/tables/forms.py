@@ -1,9 +1,8 @@
-"""Tables from elsewhere: which control's they are, by what they hold, and what its linter has to say of them.
+"""Linting of table files from elsewhere: the control or format is recognised by the content.
 
-Of controls that ncfix makes no tables for, the forms of their files are known: a form is a list of the lines that it
-may have, and what must hold between them. A file is read line by line, and written again to the byte: a line is kept as
-its words and its numbers; a number keeps its decimals, its sign and its place, so that it may be changed and the file
-written again as its control likes it.
+Controls for which ncfix makes no tables have known file forms: patterns of lines, and conditions between lines. A file
+is read line by line and can be written again unchanged to the byte. A line is kept as text and numbers; a number keeps
+its decimals, its sign and its column, so that it can be changed without changing the layout.
 """
 
 from __future__ import annotations
@@ -26,16 +25,17 @@ GAP = r"[ \t]+"
 END = re.compile(rb"\r\n|\n")
 BLANK = r"[ \t]*"
 NOTES = {"comment": rf"{BLANK}(?:;|//|#).*", "blank": BLANK}
-"""Lines that say nothing, where a form may have them."""
+"""Kinds of comment and blank lines, for forms that allow them."""
 ASIDE = r"(?:#.*|/\*.*\*/[ \t]*)?"
 LIST = {"entry": rf"[\w.\[\]]+{GAP}{N}{BLANK}{ASIDE}", "word": rf"[\w.\[\]]+{GAP}\S+{BLANK}{ASIDE}"}
 
 
 @frozen
 class FileLine:
-    """A line: what it is, its text with a slot for every number, and the numbers with the width of their slots.
+    """A line of a file: its kind, its text with a slot (NUL) for every number, and the numbers.
 
-    verbatim  the line itself where its numbers are written as a `Decimal` does not keep them: `5.`, `.5`, `007`
+    plus      for each number, whether it is written with a plus sign
+    verbatim  the whole line, if `Decimal` does not keep the form of its numbers: `5.`, `.5`, `007`
     """
 
     kind: str
@@ -45,7 +45,7 @@ class FileLine:
     verbatim: str = ""
 
     def written(self) -> str:
-        """The line."""
+        """The text of the line."""
         if self.verbatim:
             return self.verbatim
         words = (f"{'+' if plus else ''}{number}" for number, plus in zip(self.numbers, self.plus, strict=True))
@@ -54,7 +54,11 @@ class FileLine:
 
 @frozen
 class TableFile:
-    """A file of a known form. `eol` after each line; `last` whether also after the last; `start` a byte order mark."""
+    """A file of a known form.
+
+    eol    the line end; last: whether the last line has one
+    start  a byte order mark, or ""
+    """
 
     form: str
     lines: tuple[FileLine, ...]
@@ -63,7 +67,7 @@ class TableFile:
     start: str = ""
 
     def content(self) -> bytes:
-        """The file."""
+        """The bytes of the file."""
         text = self.eol.join(line.written() for line in self.lines)
         return (self.start + text + (self.eol if self.last else "")).encode("latin-1")
 
@@ -72,7 +76,7 @@ class TableFile:
         return [tuple(map(float, line.numbers)) for line in self.lines if line.kind == kind]
 
     def sections(self, kind: str) -> dict[str, list[tuple[float, ...]]]:
-        """The numbers of the lines after each line of a kind, `[X]`, under what that has between its brackets."""
+        """Name in brackets of each line of a kind, such as `[X]` -> numbers of the lines that follow it."""
         found: dict[str, list[tuple[float, ...]]] = {}
         rows: list[tuple[float, ...]] = []
         for line in self.lines:
@@ -84,7 +88,7 @@ class TableFile:
         return found
 
     def with_numbers(self, index: int, *numbers: Decimal) -> TableFile:
-        """With other numbers in one line."""
+        """The file with the numbers of one line replaced."""
         line = replace(self.lines[index], numbers=numbers, verbatim="")
         return replace(self, lines=(*self.lines[:index], line, *self.lines[index + 1 :]))
 
@@ -96,12 +100,14 @@ Check = Callable[[TableFile, Remarks], None]
 
 @frozen
 class FileForm:
-    """What lines a kind of file has: name -> pattern, whose groups are numbers; and what must hold between them.
+    """The form of a kind of file.
 
-    needs  the kinds of lines that tell it: no file of the form is without one of each
-    tells  the kinds of lines that no other form has: a file with one is of this form, whatever else is wrong in it
-    free   the pattern that its texts for people begin with, in which letters of other alphabets are only remarked on;
-           "" where no control reads the file, so that they may stand anywhere
+    kinds  kind of line -> pattern, whose groups are numbers
+    check  a check of conditions between lines
+    needs  kinds of lines of which every file of this form has at least one
+    tells  kinds of lines that no other form has: a file with one is of this form, even if it has faults
+    free   pattern of the start of comments, in which non-ASCII letters are only doubtful; "" if no control reads the
+           file, so that they may be anywhere
     """
 
     name: str
@@ -114,7 +120,7 @@ class FileForm:
 
 
 def read_form(form: FileForm, path: str, content: bytes) -> tuple[TableFile, Remarks]:
-    """A file of a form, with remarks on lines that the form does not have."""
+    """Read a file as a form, with remarks on lines and conditions that do not fit."""
     remarks = Remarks.of(path, content, form.free)
     if not form.free:
         remarks.wrong.clear()
@@ -204,7 +210,7 @@ def _united(document: TableFile, remarks: Remarks) -> None:
 
 
 def _defined(document: TableFile, remarks: Remarks) -> None:
-    """A table of one axis has as many entries as its line says; they are whole, and the last is that at zero, too."""
+    """Check of PMAC tables: entries are whole, as many as the head line states, and the last one, at zero, is 0."""
     lines = [(n, line) for n, line in enumerate(document.lines, 1) if line.kind in ("define", "row")]
     starts = [k for k, (_, line) in enumerate(lines) if line.kind == "define"]
     if not starts:
@@ -391,12 +397,12 @@ BY_NAME = {form.name: form for form in FORMS}
 
 
 def form_named(name: str) -> FileForm:
-    """The form of that name; raises KeyError."""
+    """The form `name`; raises KeyError if there is none."""
     return BY_NAME[name]
 
 
 def recognised(path: str, content: bytes) -> TableFile | None:
-    """The file as the first form that has all of its lines; None if there is none."""
+    """The file, read as the first form that fits all of its lines; None if there is none."""
     for form in FORMS:
         document, remarks = read_form(form, path, content)
         if not remarks.wrong:
@@ -406,11 +412,11 @@ def recognised(path: str, content: bytes) -> TableFile | None:
 
 @frozen
 class Linted:
-    """What was said of one file.
+    """The result of linting one file.
 
-    owner     the control, or the form of a control that ncfix makes no tables for; "" if nobody knows it
+    owner     name of the control or form; "" if the file is unknown
     title     the same for people
-    messages  what is wrong or doubtful, with places in this file
+    messages  messages on faults and doubtful contents
     """
 
     owner: str
@@ -419,10 +425,11 @@ class Linted:
 
 
 def lint_files(files: Files, control: str = "") -> Mapping[str, Linted]:
-    """What is said of files that lie together, each by its name; those of a control are looked at together.
+    """Lint the files of a folder: file name -> result. Files of one control are examined together.
 
-    Of a folder that `export` wrote, its side file says whose they are; that and the hand-over sheet are left out.
-    control: whose all of them are, if that is known. Raises `UsageError` NCF480.
+    The side file of a folder that `export` wrote names the control; it and the hand-over sheet are not linted.
+    control  the control of all files, if known
+    Raises `UsageError` NCF480.
     """
     tables = {
         name: content for name, content in files.items() if name != SIDE_FILE and not name.startswith(f"{SHEET}.")
@@ -448,12 +455,12 @@ def _look(control: Control, files: Files) -> tuple[Message, ...]:
 
 
 def _from_elsewhere(messages: tuple[Message, ...]) -> tuple[Message, ...]:
-    """Without the advice for what ncfix has written itself."""
+    """The messages without the hint `AGAIN`, which is for files that ncfix has written."""
     return tuple(replace(message, hint="") if message.hint == AGAIN else message for message in messages)
 
 
 def _shared(control: Control, files: Files, messages: Iterable[Message]) -> dict[str, Linted]:
-    """Each message with its file; one of a file that is not there is said of the first that is."""
+    """The results by file; a message on a missing file belongs to the first file."""
     parts: dict[str, list[Message]] = {name: [] for name in files}
     first = next(iter(files))
     for message in messages:
@@ -463,7 +470,7 @@ def _shared(control: Control, files: Files, messages: Iterable[Message]) -> dict
 
 
 def _of_form(name: str, content: bytes) -> Linted:
-    """A file that no control of a plugin knows: of the first form that has all of its lines, or that one line tells."""
+    """The result for a file that no plugin's control knows: by the form that fits all lines, or that a line tells."""
     read = [(form, *read_form(form, name, content)) for form in FORMS]
     whole = [(form, remarks) for form, _, remarks in read if not remarks.wrong]
     told = [(form, remarks) for form, found, remarks in read if any(line.kind in form.tells for line in found.lines)]

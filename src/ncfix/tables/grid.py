@@ -1,16 +1,15 @@
-"""A table over one or more axes: values at the nodes of a grid, linear between them, held beyond the ends.
+"""A table over one or more axes: values at the nodes of a grid, linear between them, constant beyond the ends.
 
-One input makes an ordinary compensation table, three make the three-dimensional grid of a control; between the nodes
-the values are multilinear. That is Fanuc's formula for eight vertices (Series 30i three-dimensional error compensation,
-A-79351E) in any number of dimensions.
+One input is an ordinary compensation table, three inputs the three-dimensional grid of a control. Values between nodes
+are multilinear: Fanuc's formula for eight vertices (Series 30i three-dimensional error compensation, A-79351E) in any
+number of dimensions.
 
-Values: a node that holds the exact value leaves an error of one sign in both cells beside it; the node that is fitted
-to what lies around it (least squares) shares that error out, and leaves about half of the largest.
+Values: exact values at the nodes leave an error of one sign in both adjacent cells; values fitted to the surroundings
+(least squares) share that error out, and leave about half of the maximum.
 
-Nodes: `Bending` looks at the correction on some random lines along an axis, in steps so fine that what lies between
-them does not matter. From those the miss of any number of evenly spaced nodes is read; or, where a format does not want
-even steps, nodes are put as far apart as the bending allows: on the kinks of a table, and close together where a screw
-turns.
+Nodes: `Bending` evaluates the correction on random lines along an axis in fine steps. From these follows the error of
+any number of evenly spaced nodes. If a format allows uneven nodes, they are placed as far apart as the bending allows:
+on the kinks of a table, and close together within the period of a screw.
 """
 
 from __future__ import annotations
@@ -25,25 +24,25 @@ from ncfix.arrays import Array, Index
 from ncfix.values import frozen, mutable
 
 WITHIN = 4
-"""Places looked at in each cell along each axis."""
+"""Number of positions in each cell along each axis for the least-squares fit."""
 STEPS = (128, 256, 512, 1024)
-"""Fine steps over the range: as many as it takes, or the most."""
+"""Numbers of fine steps that are tried until they suffice."""
 TRIED = 40
-"""Positions in between at which it is seen whether there are enough."""
+"""Number of positions between them at which that is checked."""
 RIGHT = 2e-5
-"""mm: what fine steps may miss there."""
+"""Largest error of interpolation between fine steps, mm."""
 SAME = 1e-7
-"""Of the range: places nearer to each other than that are one."""
+"""Positions closer than this share of the range are one."""
 BETWEEN = 4
-"""Points looked at between two nodes of a line."""
+"""Number of positions between two nodes at which the error of a line is evaluated."""
 GOLDEN = 0.6180339887498949
-"""Of a cell, by which those points move on from cell to cell, lest they keep step with the pitch of a screw."""
+"""Shift of these positions from cell to cell, as a share of a cell, so that no screw pitch is missed."""
 FINER = 0.8
-"""From one choice of uneven nodes to the next, what they may miss."""
+"""Ratio of the tolerances of consecutive choices of uneven nodes."""
 LEAST = 2e-5
-"""mm: they need not miss less."""
+"""Smallest tolerance of uneven nodes, mm."""
 MANY = 200
-"""Uneven nodes, at most."""
+"""Largest number of uneven nodes."""
 
 
 @frozen
@@ -54,7 +53,7 @@ class Grid:
     nodes    the positions of the nodes along each input, strictly ascending, mm or rad
     outputs  the axes that the values belong to
     values   (*counts, n_outputs), mm or rad
-    modulo   which inputs repeat after their last node, instead of holding its value
+    modulo   for each input, whether it repeats after its last node instead of staying constant
     """
 
     inputs: tuple[str, ...]
@@ -72,12 +71,12 @@ class Grid:
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """How many nodes there are along each input."""
+        """Number of nodes along each input."""
         return tuple(len(line) for line in self.nodes)
 
     @property
     def points(self) -> int:
-        """How many nodes there are."""
+        """Number of nodes."""
         return int(np.prod(self.counts))
 
     def at(self, positions: Array) -> Array:
@@ -98,7 +97,7 @@ class Grid:
         return total
 
     def _place(self, index: int, column: Array) -> tuple[Index, Array]:
-        """In which cell along one input, and how far through it (0 ... 1)."""
+        """Index of the cell of each position along one input, and the share of the cell (0 ... 1)."""
         line = self.nodes[index]
         if len(line) == 1:
             return np.zeros(len(column), dtype=np.intp), np.zeros(len(column))
@@ -120,15 +119,14 @@ def on_full_grid(function: Callable[[Array], Array], lines: Sequence[Array]) -> 
 
 
 def hats(places: Array, nodes: Array) -> Array:
-    """The weight of every node (m) at every place (n), linear between nodes and held beyond the ends: (n, m)."""
+    """Weights (n, m) of m nodes at n places: linear between nodes, constant beyond the ends."""
     return np.stack([np.interp(places, nodes, row) for row in np.eye(len(nodes))], axis=1)
 
 
 def spline_weights(nodes: Array, places: Array, turn: float | None = None) -> Array:
-    """The weight of every node (m >= 2) at every place (n) of the cubic spline through values at the nodes: (n, m).
+    """Weights (n, m) of m >= 2 nodes at n places for a cubic spline through the values at the nodes.
 
-    The spline has no knot at the second and the last but one node, and goes on beyond the ends; with a `turn` it
-    repeats after that. SciPy's is the same, and takes long to import.
+    It is a not-a-knot spline that extrapolates; with `turn` it is periodic. SciPy has the same, but its import is slow.
     """
     count, eye = len(nodes), np.eye(len(nodes))
     line = nodes if turn is None else np.append(nodes, nodes[0] + turn)
@@ -164,21 +162,21 @@ def spline_weights(nodes: Array, places: Array, turn: float | None = None) -> Ar
 
 
 def projector(places: Array, nodes: Array) -> Array:
-    """What turns values at places (n) into the values at nodes (m) that come nearest to them in all: (m, n)."""
+    """The least-squares operator (m, n) from values at n places to values at m nodes."""
     return np.asarray(np.linalg.pinv(hats(places, nodes)), dtype=np.float64)
 
 
 def between(nodes: Array, within: int = WITHIN) -> Array:
-    """Nodes (n,) and evenly spaced places in the cells between them, ascending: (within (n - 1) + 1,)."""
+    """The n nodes and `within - 1` even places in each cell between them, ascending: (within (n - 1) + 1,)."""
     share = np.arange(within) / within
     inner = nodes[:-1, None] + share * np.diff(nodes)[:, None]
     return np.append(inner.reshape(-1), nodes[-1])
 
 
 def fitted(values: Array, places: Sequence[Array], nodes: Sequence[Array]) -> Array:
-    """Least squares over a regular grid of places: values (*places, k) -> (*nodes, k).
+    """Least-squares fit of a table: values (*places, k) on a grid of places -> values (*nodes, k).
 
-    The weights of a multilinear table are products of those along its axes, so that one axis after another will do.
+    The weights of a multilinear table are products over its axes, so the axes are fitted one after another.
     """
     for axis, (line, knots) in enumerate(zip(places, nodes, strict=True)):
         summed = np.tensordot(projector(line, knots), values, axes=(1, axis))
@@ -188,10 +186,10 @@ def fitted(values: Array, places: Sequence[Array], nodes: Sequence[Array]) -> Ar
 
 @mutable
 class Bending:
-    """Corrections along random lines over one axis.
+    """Corrections on random lines along one axis, and the errors of tables over it.
 
-    places  ascending, (n_places,)
-    values  (n_lines, n_places, n_outputs) mm
+    places  (n_places,) positions of the axis, ascending
+    values  (n_lines, n_places, n_outputs) corrections, mm
     """
 
     places: Array
@@ -200,9 +198,9 @@ class Bending:
 
     @classmethod
     def over(cls, low: float, high: float, kinks: Array, along: Callable[[Array], Array]) -> Bending:
-        """From a function that gives the corrections at positions (n,): (n_lines, n, n_outputs).
+        """Evaluate `along`, positions (n,) -> corrections (n_lines, n, n_outputs), in sufficiently fine steps.
 
-        kinks  positions at which they may have a corner
+        kinks  positions at which the corrections may have a corner
         """
         tried = low + (high - low) * np.mod(GOLDEN * np.arange(1, TRIED + 1), 1.0)
         meant = along(tried)
@@ -234,7 +232,7 @@ class Bending:
         return float(np.linalg.norm(values - chord, axis=2)[:, seen].max(initial=0.0))
 
     def ends(self, allowed: float) -> tuple[float, float]:
-        """The places between which corrections change: before and after them by no more than is allowed, mm."""
+        """The positions between which corrections change; outside they vary by at most `allowed`, mm."""
         low, high = (self._level(values, allowed) for values in (self.values, self.values[:, ::-1]))
         if low + high >= len(self.places) - 1:
             return float(self.places[0]), float(self.places[-1])
@@ -242,7 +240,7 @@ class Bending:
 
     @staticmethod
     def _level(values: Array, allowed: float) -> int:
-        """The last place up to which corrections are as they are there, but for what is allowed."""
+        """Index of the last place up to which all corrections are within `allowed` of each other, mm."""
         last = 0
         for place in range(1, values.shape[1]):
             change = np.linalg.norm(values[:, :place] - values[:, place : place + 1], axis=2)
@@ -252,7 +250,7 @@ class Bending:
         return last
 
     def uneven(self) -> dict[int, tuple[Array, float]]:
-        """Number n of nodes -> where they are best put, (n,), and the largest correction that they miss then, mm."""
+        """Number n of nodes -> their best positions (n,), and the largest correction that they miss, mm."""
         if not self._uneven:
             ends = np.array([0, len(self.places) - 1])
             allowed = self._chord(0, len(self.places) - 1)
@@ -264,7 +262,7 @@ class Bending:
         return self._uneven
 
     def _as_far_as(self, allowed: float) -> Array:
-        """Places, each as far from the one before as straight lines miss no more than what is allowed."""
+        """Indices of places as far apart as possible with straight lines between them within `allowed`, mm."""
         last = len(self.places) - 1
         chosen = [0]
         while chosen[-1] < last:

@@ -1,11 +1,11 @@
-"""A correction of many axes as a sum of grids over a few of them each.
+"""A correction over many axes as a sum of grids over a few axes each.
 
-A grid over five axes takes the product of five numbers of nodes. But no error needs all five at once: what the axes of
-the table are wrong by moves the tip by an angle times a distance, so that each linear axis is corrected by functions of
-two rotary axes and one linear axis, and by functions of the linear axes. Which sets of axes belong together need not be
-known: the correction is taken apart into what each set of axes changes together (`interactions`), and the sets that
-matter are shared out among a few grids (`faces`). The first grid then holds the correction with the other axes in the
-middle of their range, the second what it lacks there, and so on: where the sum can say the correction at all, it does.
+A grid over five axes has the product of five numbers of nodes. But no error needs all five at once: angular errors of
+the table move the tip by an angle times a distance, so each linear axis needs functions of two rotary axes and one
+linear axis, and functions of the linear axes. Which sets of axes interact need not be known: the correction is
+decomposed into interactions of sets of axes (`interactions`), and the sets that matter are assigned to a few grids
+(`faces`). The first grid holds the correction with the other axes in the middle of their ranges, the second what the
+first lacks there, and so on. The sum is exact if the correction is such a sum.
 """
 
 from __future__ import annotations
@@ -23,31 +23,32 @@ from ncfix.tables.volume import CHECKS, Volume, search
 from ncfix.values import frozen
 
 COARSE = 6
-"""Positions of each axis at which the correction is taken apart."""
+"""Number of positions of each axis at which the correction is decomposed."""
 SHARE = 0.05
-"""What is not said by any face may be so much of the target, rms."""
+"""Largest share of the target, rms, of interactions that no face holds."""
 LIKELY = 10
-"""Nodes along an axis, by which faces are compared before they are searched for."""
+"""Assumed number of nodes along an axis, to compare faces before the search."""
 ROUNDS = 5
+"""Largest number of rounds of the search."""
 TIGHTER = 0.95
-"""Of the share that the last round suggests, what the next one takes."""
+"""Factor on the tolerance that the last round suggests."""
 LOOSER = 1.1
-"""Times what the number of nodes suggests if there are too many."""
+"""Factor on the increase of the tolerance that an excess of nodes suggests."""
 EVEN = 0.3
-"""Power of its number of nodes by which a face gets more of what may be missed: that saves nodes where many are."""
+"""Power of the number of nodes of a face in its share of the tolerance: larger faces get more, which saves nodes."""
 SAME = 1 << 20
-"""Positions of which there may be more different ones are taken as they are."""
+"""Largest number of distinct combinations of positions for which duplicates are sought."""
 MANY = 8
-"""More sets than these are not shared out among faces."""
+"""Largest number of interacting sets that are assigned to faces."""
 Set = frozenset[int]
-"""Axes by their number among the inputs."""
+"""A set of axes, by their indices among the inputs."""
 
 
 @frozen
 class Face:
-    """A set of inputs (their numbers), and the outputs (their numbers) that have a grid over it.
+    """A set of inputs, and the outputs that have a grid over it; both by index.
 
-    owner  the input that the face belongs to: an output has one face of each owner at most
+    owner  the input that owns the face: an output has at most one face of each owner
     """
 
     owner: int
@@ -57,7 +58,10 @@ class Face:
 
 @frozen
 class Sum:
-    """Grids whose sum is the correction, with what they miss at random poses, mm."""
+    """Grids whose sum is the correction.
+
+    left     largest correction that they miss at random poses, mm; reached: whether that is within the target
+    """
 
     faces: tuple[Face, ...]
     grids: tuple[Grid, ...]
@@ -66,14 +70,14 @@ class Sum:
 
     @property
     def points(self) -> int:
-        """The nodes of all of them."""
+        """Number of nodes of all grids."""
         return sum(grid.points for grid in self.grids)
 
 
 def interactions(values: Array, n_inputs: int) -> dict[Set, Array]:
-    """What each set of axes changes together: its rms over a full grid of values (*counts, n_outputs), (n_outputs,).
+    """The rms of each interaction of a set of axes, (n_outputs,), of values (*counts, n_outputs) on a full grid.
 
-    The parts are orthogonal: their squares add up to the mean square of all.
+    The interactions are orthogonal: their squares add up to the mean square of the values.
     """
     parts: dict[Set, Array] = {}
     for size in range(n_inputs + 1):
@@ -86,9 +90,9 @@ def interactions(values: Array, n_inputs: int) -> dict[Set, Array]:
 
 
 def faces(volume: Volume, owners: Sequence[int], target: float) -> tuple[Face, ...] | None:
-    """The faces that say the correction to within a share of the target (mm rms), or None if there are none.
+    """The faces that hold the correction to within `SHARE` of the target (mm rms), or None if there are too many sets.
 
-    Each belongs to an owner, one of the inputs, which is among its own inputs.
+    owners  the inputs (by index) that may own a face; the owner is one of the face's inputs
     """
     lines = [_coarse(low, high, number) for number, (low, high) in enumerate(volume.ranges.tolist())]
     values = on_full_grid(volume.exact, lines)
@@ -105,13 +109,13 @@ def faces(volume: Volume, owners: Sequence[int], target: float) -> tuple[Face, .
 
 
 def _coarse(low: float, high: float, number: int) -> Array:
-    """Positions over a range, not so even that a screw's period could hide."""
+    """Positions over a range, slightly uneven so that the period of a screw cannot be missed."""
     shift = 0.3 * (np.mod((np.arange(COARSE) + number) * 0.618034, 1.0) - 0.5)
     return low + (high - low) * (np.arange(COARSE) + 0.5 + shift) / COARSE
 
 
 def _largest_sets(sizes: Mapping[Set, float], target: float) -> list[Set]:
-    """The sets that matter, without those within another; the smallest that are below the share together are left."""
+    """The maximal sets that matter; the smallest ones, together below `SHARE` of the target, are left out."""
     remaining = dict(sizes)
     total = 0.0
     for key in sorted(sizes, key=lambda key: sizes[key]):
@@ -123,7 +127,7 @@ def _largest_sets(sizes: Mapping[Set, float], target: float) -> list[Set]:
 
 
 def _shared_out(sets: Sequence[Set], owners: Sequence[int]) -> dict[int, Set] | None:
-    """The cheapest way to give every set to an owner, whose face it then is part of: owner -> its face."""
+    """The cheapest assignment of the sets to owners: owner -> its face, the union of its sets; None if too many."""
     if len(sets) > MANY:
         return None
     choices = []
@@ -136,7 +140,7 @@ def _shared_out(sets: Sequence[Set], owners: Sequence[int]) -> dict[int, Set] | 
 
 
 def searched(volume: Volume, found: Sequence[Face], target: float, points: int) -> Sum:
-    """The grids of the faces with few nodes, at most `points` in all, that together miss at most the target (mm)."""
+    """Grids for the faces with few nodes, at most `points` in all, that together miss at most `target`, mm."""
     parts = [_part(volume, face, found[:number]) for number, face in enumerate(found)]
     shares = np.full(len(parts), target / np.sqrt(len(parts)))
     positions = random_poses(volume.ranges, CHECKS, seed=3)
@@ -169,7 +173,7 @@ def _total(volume: Volume, grids: Sequence[Grid], positions: Array) -> Array:
 
 
 def _part(volume: Volume, face: Face, before: Sequence[Face]) -> Volume:
-    """What one face holds: the correction less what the faces before it hold, the other axes in their middle."""
+    """The volume of one face: the correction with the other axes in the middle, less what earlier faces hold."""
     recipe = _recipe(face, before)
     middle = volume.ranges.mean(axis=1)
 
@@ -197,7 +201,7 @@ def _part(volume: Volume, face: Face, before: Sequence[Face]) -> Volume:
 
 
 def _different(positions: Array) -> tuple[Array, Index]:
-    """Positions (n, k), each once, (m, k), and which of these each is, (n,): on a grid many are the same."""
+    """The distinct rows (m, k) of positions (n, k), and for each row its index among these, (n,)."""
     codes, count = np.zeros(len(positions), dtype=np.intp), 1
     for column in positions.T:
         values, place = np.unique(column, return_inverse=True)
@@ -209,9 +213,9 @@ def _different(positions: Array) -> tuple[Array, Index]:
 
 
 def _recipe(face: Face, before: Sequence[Face]) -> dict[Set, Array]:
-    """How a face is put together of corrections that follow some axes only: axes -> factor of each output.
+    """A face as a sum of corrections that depend on some axes, the others in the middle: axes -> factor per output.
 
-    What a face before it holds already is what the correction is with all axes in the middle that it does not have.
+    An earlier face holds the correction with all axes in the middle that it does not have; this is subtracted.
     """
     recipe: dict[Set, Array] = {}
     for number, output in enumerate(face.outputs):

@@ -1,12 +1,12 @@
-"""The least that any tables of a kind can leave at the worst: whether a better fit is worth looking for.
+"""Lower bounds of the largest error that any tables of a kind can leave, which tell whether a better fit is possible.
 
-Tables hold functions of some axes. Where these stand still and the correction changes all the same, the best that they
-can do is to lie in the middle: half of the largest distance between two corrections is left, whatever is in them.
+Tables are functions of some axes. If the correction changes while these axes stand still, the best value is the middle:
+half the largest distance between two corrections remains, whatever the tables contain.
 
-Of sums of functions of two axes, `least_worst` finds the best against the largest error, and proves that nothing does
-better. The least-squares fit leaves most in the corners of the space. Fitting again and again with weights that grow
-where much is left (C. L. Lawson, 1961) evens that out. It also bounds what is possible: whatever the weights, no
-function of the kind leaves less at the worst than the weighted root mean square that the weighted fit leaves.
+For sums of functions of two axes, `least_worst` finds a fit of small largest error, with a lower bound. A least-squares
+fit leaves most in the corners of the space. Iteratively reweighted fits, with weights that grow with the error (C. L.
+Lawson, 1961), even that out. They also give the bound: for any weights, the largest error of every function of the kind
+is at least the weighted root mean square error of the weighted fit.
 """
 
 from __future__ import annotations
@@ -38,30 +38,31 @@ from ncfix.values import frozen
 
 ROUNDS = 40
 SWEEPS = 2
-"""Times that all pairs are fitted in a round."""
+"""Number of sweeps over all pairs in a round."""
 FIRST = 4
-NEAR = 1.04
-"""The largest error left may be so much above the bound."""
+"""The same in the first round."""
+CLOSE_RATIO = 1.04
+"""Ratio of the largest error to the bound at which the iteration ends."""
 BASE = 0.05
-"""Share of the weights that stays even."""
+"""Share of the weights that stays uniform."""
 PLACES, OTHERS = 96, 96
-"""Positions of the axes that are looked up, and poses of the others at each."""
+"""Number of positions of the axes that are looked up, and of poses of the other axes at each."""
 FINE = 16
-"""Places in each cell of a line."""
+"""Number of positions in each cell of a line."""
 LINES = 4
-"""Lines along an axis, besides those in the corners."""
+"""Number of lines along an axis, besides those in the corners."""
 NODES = 7
-"""Positions of each axis on a full grid."""
+"""Number of positions of each axis on a full grid."""
 
 
 @frozen
 class Remainder:
-    """What functions of pairs of axes leave of a function on a full grid.
+    """The remainder of a function on a full grid after subtraction of functions of pairs of axes.
 
     nodes   positions along every axis
-    turns   which axes repeat after a turn
-    values  (*counts, n_outputs): the function less the functions of pairs
-    bound   the least that any functions of pairs can leave at the worst of the nodes
+    turns   for each axis, whether it repeats after a turn
+    values  (*counts, n_outputs) the remainder
+    bound   lower bound of the largest remainder, at the nodes, for any functions of pairs
     """
 
     nodes: Sequence[Array]
@@ -71,16 +72,16 @@ class Remainder:
 
     @property
     def rms(self) -> float:
-        """Over the space, of the length over all outputs: nodes at its ends stand for half as much as others."""
+        """Root mean square over the space of the length over all outputs; end nodes count half."""
         return float(np.sqrt((_shares(self.values.shape[:-1], self.turns)[..., None] * self.values**2).sum()))
 
     @property
     def largest(self) -> float:
-        """At the worst of the nodes."""
+        """Largest length over all outputs at any node."""
         return float(np.linalg.norm(self.values, axis=-1).max())
 
     def along(self, axis: int, positions: Array, places: Index) -> Array:
-        """At positions (n,) of one axis and nodes `places` (m, n_axes) of the others, by splines: (n, m, n_outputs)."""
+        """Values (n, m, n_outputs) at positions (n,) of one axis, by splines, and nodes `places` (m, n_axes) else."""
         values = np.moveaxis(self.values, axis, 0)
         weights = spline_weights(self.nodes[axis], positions, 2 * np.pi if self.turns[axis] else None)
         curve = (weights @ values.reshape(len(values), -1)).reshape(len(positions), *values.shape[1:])
@@ -90,12 +91,11 @@ class Remainder:
 def least_worst(
     nodes: Sequence[Array], turns: Sequence[bool], values: Array, enough: float, together: int = 2
 ) -> Remainder:
-    """What is left of values (*counts, n_outputs) by those functions of pairs that leave little at the worst.
+    """The remainder of values (*counts, n_outputs) with functions of pairs of small largest error.
 
-    Of all that are tried those for which the product of the largest error and the rms is smallest: what lowers one by
-    raising the other as much is no gain.
+    Among the fits of all rounds the one with the smallest product of largest error and rms is chosen.
 
-    enough    as much may be left at the worst by the least-squares fit, which is then kept
+    enough    largest error at which the least-squares fit is kept
     together  1: sums of functions of one axis each, instead of two
     """
     grid = values.shape[:-1]
@@ -113,7 +113,7 @@ def least_worst(
         if number == 0 or product < least:
             best, worst, least = np.moveaxis(left, 0, -1), largest, product
         grown = weights * np.sqrt(squares)
-        if worst <= max(NEAR * bound, enough) or not grown.any():
+        if worst <= max(CLOSE_RATIO * bound, enough) or not grown.any():
             break
         weights = (1 - BASE) * grown / grown.sum() + BASE * even
     return Remainder(nodes, turns, np.ascontiguousarray(best), bound)
@@ -124,14 +124,14 @@ Axes = tuple[int, ...]
 
 
 class _Sums:
-    """Sums of values on a full grid (..., *counts) over all but some axes, each worked out from the next larger one."""
+    """Sums of values on a full grid (..., *counts) over all but some axes, each computed from a larger one; cached."""
 
     def __init__(self, values: Array, axes: int) -> None:
         self.known = {tuple(range(axes)): values}
         self.axes, self.before = axes, values.ndim - axes
 
     def over(self, subset: Axes) -> Array:
-        """The sums that depend on the axes of `subset`; the others are left with one place."""
+        """The sum as a function of the axes of `subset`; the other axes have length one."""
         if subset not in self.known:
             gone = max(axis for axis in range(self.axes) if axis not in subset)
             larger = self.over(tuple(sorted((*subset, gone))))
@@ -144,12 +144,11 @@ Functions = dict[Axes, Array]
 
 
 def _fitted(left: Array, weights: Array, sets: Sequence[Axes], sweeps: int) -> tuple[Functions, Functions]:
-    """Functions of some sets of axes each whose sum is near `left` (n_outputs, *counts) in the weighted mean square.
+    """Functions of the sets of axes, fitted to `left` (n_outputs, *counts) by weighted least squares; and the weighted
+    sums of the residual over the other axes of each set.
 
-    And the weighted sums, over the other axes, of what they leave.
-
-    One after the other is fitted to what the others leave, so many times. For that no more is needed of the grid than
-    the weighted sums of `left` over all but the axes of each set, and of the weights over all but those of each two.
+    Each function in turn is fitted to the residual of the others, in `sweeps` sweeps. This needs only the weighted sums
+    of `left` over all but the axes of each set, and of the weights over all but the axes of each two sets.
     """
     totals, sums = _Sums(weights, weights.ndim), _Sums(weights * left, weights.ndim)
     ends = np.cumsum([0, *(totals.over(subset).size for subset in sets)]).tolist()
@@ -170,7 +169,7 @@ def _fitted(left: Array, weights: Array, sets: Sequence[Axes], sweeps: int) -> t
 
 
 def _shared(totals: _Sums, sets: Sequence[Axes], places: Sequence[slice], subset: Axes, count: int) -> Array:
-    """The weight that places of the set `subset` have in common with places of all sets, (n_subset, count)."""
+    """Common weight of each place of the set `subset` with each place of all sets, (n_subset, count)."""
     shape = totals.over(subset).shape
     found = np.zeros((np.prod(shape), count))
     for other, place in zip(sets, places, strict=True):
@@ -183,14 +182,14 @@ def _shared(totals: _Sums, sets: Sequence[Axes], places: Sequence[slice], subset
 
 @cache
 def _union(one: Axes, other: Axes, axes: int) -> tuple[Axes, str, tuple[Any, ...]]:
-    """The axes of both sets; how the part of a block that they have in common is named; an index without others."""
+    """The union of two sets of axes; the einsum subscripts of the block over both; an index that drops other axes."""
     both = tuple(sorted({*one, *other}))
     first, second, union = ("".join(ascii_letters[axis] for axis in each) for each in (one, other, both))
     return both, f"{first}{second}->{union}", tuple(slice(None) if axis in both else 0 for axis in range(axes))
 
 
 def _together(functions: Functions) -> Array:
-    """The sum of functions of some axes each, those that end with one axis first: most sums are over few axes."""
+    """The sum of functions of some axes each; grouped by the last axis, so that most additions are of small arrays."""
     total: Array = np.zeros(())
     for last in sorted({subset[-1:] for subset in functions}):
         group = [functions[subset] for subset in sorted(functions) if subset[-1:] == last]
@@ -199,7 +198,7 @@ def _together(functions: Functions) -> Array:
 
 
 def _shares(counts: Sequence[int], turns: Sequence[bool]) -> Array:
-    """How much of the space each node stands for, (*counts); 1 in all."""
+    """Share of the space of each node, (*counts), with sum 1."""
     shares = np.ones(())
     for count, turn in zip(counts, turns, strict=True):
         line = np.ones(count)
@@ -210,11 +209,11 @@ def _shares(counts: Sequence[int], turns: Sequence[bool]) -> Array:
 
 
 def _proven(left: Array, weights: Array, sums: Functions) -> float:
-    """The least that can be left at the worst: what a measure sees that is blind to functions of some sets of axes.
+    """Lower bound of the largest error, by a signed measure that is orthogonal to all functions of the sets of axes.
 
-    sums  of `weights * left` over all axes but those of each set
+    sums  sums of `weights * left` over all axes but those of each set
 
-    Taken out of the measure is what depends on the axes of a set: means over the others, less what is in several.
+    The measure is `weights * left` less its parts that depend on the axes of a set, by inclusion and exclusion.
     """
     axes, order = weights.ndim, len(next(iter(sums)))
     seen: Functions = {}
@@ -232,7 +231,7 @@ def _proven(left: Array, weights: Array, sums: Functions) -> float:
 
 
 def least_of_functions(machine: Machine, space: Array, tool_length: float, inputs: Sequence[str], ways: bool) -> Least:
-    """Tables over the axes `inputs` alone; `ways`: play of the axes is taken off besides."""
+    """The bound for tables over the axes `inputs` only; `ways`: backlash is compensated separately."""
     chosen = [name in inputs for name in machine.axis_names]
     q = _mixed(space, np.array(chosen))
     direction = np.zeros_like(q) if ways else random_ways(len(space), len(q), seed=32)
@@ -243,7 +242,7 @@ def least_of_functions(machine: Machine, space: Array, tool_length: float, input
 
 
 def least_of_own_axis(machine: Machine, space: Array, tool_length: float) -> Least:
-    """A table of each axis over itself, for each way apart."""
+    """The bound for a table of each axis over itself, one for each direction."""
     values = {}
     for axis in linear_axes(machine):
         q = _mixed(space, np.arange(len(space)) == axis)
@@ -254,7 +253,7 @@ def least_of_own_axis(machine: Machine, space: Array, tool_length: float) -> Lea
 
 
 def least_of_sums(machine: Machine, space: Array, tool_length: float) -> Least:
-    """Sums of functions of one axis each, with the rotary axes turned right by their own errors."""
+    """The bound for sums of functions of one axis each, with rotary axes corrected for their own errors."""
     lines = [np.linspace(low, high, NODES) for low, high in space.tolist()]
     values = on_full_grid(lambda q: _correction(machine, q, tool_length)[:, linear_axes(machine)], lines)
     left = least_worst(lines, [False] * len(lines), values, 0.0, together=1)
@@ -262,9 +261,9 @@ def least_of_sums(machine: Machine, space: Array, tool_length: float) -> Least:
 
 
 def least_of_even_nodes(volume: Volume, index: int, count: int) -> Least:
-    """Evenly spaced nodes along one input, from one end of the range to the other, whatever the others have.
+    """The bound for `count` evenly spaced nodes along one input, whatever the nodes of the others.
 
-    Along a line such a table is straight between them; which values come nearest at the worst is a linear programme.
+    Along a line such a table is piecewise linear; its values of least largest error are a linear programme.
     """
     low, high = volume.covered[index].tolist()
     unit = volume.units[index]
@@ -280,20 +279,20 @@ def least_of_even_nodes(volume: Volume, index: int, count: int) -> Least:
 
 
 def _correction(machine: Machine, q: Array, tool_length: float) -> Array:
-    """The exact correction where the rotary axes are turned right by their own errors, (n, n_axes)."""
+    """The exact correction (n, n_axes) with rotary axes corrected for their own angular positioning errors."""
     state = State(tool_length)
     return exact_correction(machine, q, state, own_rotary_correction(machine, q, state))
 
 
 def _mixed(space: Array, chosen: Array) -> Array:
-    """Positions of the axes that are chosen, each with many of the others, ends first: (PLACES * OTHERS, n_axes)."""
+    """Poses (PLACES * OTHERS, n_axes): each position of the chosen axes with many of the others, corners first."""
     standing = np.concatenate([corners(space), even_poses(space, PLACES)])[:PLACES]
     varied = np.concatenate([corners(space), even_poses(space, OTHERS)])[:OTHERS]
     return np.where(chosen, standing[:, None], varied[None]).reshape(-1, len(space))
 
 
 def _nearest(places: Array, curve: Array, nodes: Array) -> float:
-    """The least by which a function that is straight between nodes misses a curve at the worst."""
+    """Smallest possible largest deviation of a piecewise linear function over the nodes from a curve."""
     from scipy.optimize import linprog
 
     weights, one = hats(places, nodes), np.ones((len(places), 1))

@@ -1,10 +1,10 @@
-"""The automatic scheme: which one-input tables, sums and products of pairs a machine's correction takes.
+"""The automatic scheme: the one-input tables, sums and products of pairs for a machine's correction.
 
-Any chain, any errors: the exact correction is taken apart on a grid and put into as few tables as possible
-(`separable`); of its parts all are chosen that matter, or those that matter most if tables are few (`PartSelection`).
-Their functions are then followed along every axis (`scheme_tables`). Rotary axes come first; the linear axes then
-correct what is left where that leads, so that the tip is right whatever the rotary tables miss. What changes with the
-way an axis moves becomes tables for one way each.
+It works for any chain and any errors. The exact correction is decomposed on a grid and arranged in as few tables as
+possible (`separable`). All parts that matter are chosen, or the most important ones if tables are few
+(`PartSelection`). Their functions are then evaluated along every axis (`scheme_tables`). Rotary axes are first; the
+linear axes then correct the rest at the resulting poses, so the tip is right whatever the rotary tables miss. Parts
+that change with the direction of an axis become one table for each direction.
 """
 
 from __future__ import annotations
@@ -36,45 +36,45 @@ from ncfix.tables.separable import (
 from ncfix.values import frozen, mutable
 
 MANY_MORE = 12
-"""Tables than there are: down to so many, parts are left out by their size alone."""
+"""Excess of tables above which parts are dropped by their size alone."""
 TRIED = 12
-"""Of the parts that are left out, how many are tried in place of others."""
+"""Number of dropped parts, the largest, that are tried in place of others."""
 OutputWay = tuple[int, int | None]
 """(output, way): the correction of an axis, and the axis with whose direction it changes sign, or None."""
 Key = tuple[OutputWay, int]
-"""A part: the face, and its number there, the largest first."""
+"""A part: (output, way), and its index there, the largest first."""
 NODES = 8
-"""Positions of each axis at which the correction is taken apart; fewer if there are more than five axes."""
+"""Number of positions of each axis at which the correction is decomposed; fewer for more than `FULL` axes."""
 PROVEN = 10
-"""Positions of each axis for the bound that is said: more of them prove more."""
+"""The same for the reported bound: more positions prove more."""
 FULL = 5
-"""With more axes than these there are fewer positions of each."""
+"""Largest number of axes with the full number of positions each."""
 LEVER = 200.0
-"""mm: an angle of a rotary axis is judged by what it does to the tip at that distance."""
+"""Distance at which an angle of a rotary axis is compared with a length, mm."""
 ROTARY_SHARE = 8
-"""Rotary axes get one table in so many at most, if tables are few: they do little for the tip."""
+"""Rotary axes get at most one table in this many: they matter little for the tip."""
 FEWER = (1, 3, 5, 8, 12, 16)
-"""Tables that rotary axes are tried with: what follows other axes in them may leave more that takes three at once."""
-ALIKE = 1.02
-"""Bounds that differ by less are the same: then more tables for the rotary axes are better."""
+"""Numbers of tables that are tried for rotary axes: more may increase the rest that depends on three axes at once."""
+SAME_BOUND = 1.02
+"""Ratio within which bounds count as equal; then more tables for the rotary axes are better."""
 SMALL = 0.1
-"""Parts that are below this share of the target (rms) together are left out."""
+"""Parts that together are below this share of the target, rms, are dropped."""
 AGAINST_REST = 0.15
-"""So are parts that are below this share of what cannot be said anyway."""
+"""So are parts below this share of the rest that no tables can hold."""
 MERGED = 0.25
-"""Share of what may be left out that may be lost each time by writing a function as a multiple of others."""
+"""Share of that allowance that may be lost by each replacement of a function by a multiple of others."""
 
 
 @mutable
 class PartSelection:
-    """The parts that are chosen of each face, and the layouts that say them.
+    """The chosen parts of the decomposed corrections ("faces": output and way), and the layouts of their tables.
 
-    faces      what each face consists of
-    tolerance  rms that a layout may be off by when it merges tables
-    free       axes whose sum over themselves takes no table of this kind (it goes into another one)
-    chosen     the parts that tables are made for
-    silent     faces of which not even the constant is chosen
-    beside     tables more for each that multiplies others, and for each that is multiplied
+    faces      the decomposition of each face
+    tolerance  rms that may be lost when tables are merged
+    free       axes whose sum over themselves takes no table of this kind
+    chosen     the parts for which tables are made
+    silent     faces of which even the constant is dropped
+    beside     further tables for each table that multiplies others, and for each that is multiplied
     """
 
     faces: Mapping[OutputWay, Separation]
@@ -89,12 +89,12 @@ class PartSelection:
         self.chosen = frozenset((face, n) for face, parts in self.faces.items() for n in range(len(parts.parts)))
 
     def again(self) -> PartSelection:
-        """A copy, to be changed on its own."""
+        """An independent copy."""
         return copy(self)
 
     @property
     def outputs(self) -> list[int]:
-        """The axes that are corrected."""
+        """Columns of the corrected axes."""
         return list(dict.fromkeys(output for output, _ in self.faces))
 
     def part(self, key: Key) -> Part:
@@ -103,28 +103,28 @@ class PartSelection:
         return self.faces[face].parts[number]
 
     def layouts(self, output: int) -> list[TableLayout]:
-        """The layouts of an axis, not absorbed, that without direction first; empty ones left out."""
+        """The layouts of an axis, not absorbed, the one without direction first; without empty ones."""
         found = [self._layouts(face)[0] for face in self.faces if face[0] == output]
         return [layout for layout in found if layout.axes or layout.constant]
 
     def tables(self, output: int) -> int:
-        """How many tables an axis takes."""
+        """Number of tables that an axis takes."""
         layouts = [self._layouts(face)[1] for face in self.faces if face[0] == output]
         return needed(output, layouts, self.free, self.beside)
 
     @property
     def total(self) -> int:
-        """How many tables all of it takes."""
+        """Number of tables in all."""
         return sum(self.tables(output) for output in self.outputs)
 
     @property
     def lost(self) -> float:
-        """Rms of the parts that were left out."""
+        """Rms of the dropped parts."""
         gone = (part.size**2 for face in self.faces for n, part in self._numbered(face) if (face, n) not in self.chosen)
         return float((sum(gone) + sum(self.faces[face].constant ** 2 for face in self.silent)) ** 0.5)
 
     def drop_small(self, budget: float) -> None:
-        """Leave out the smallest parts as long as they are below `budget` (rms) together."""
+        """Drop the smallest parts as long as they are below `budget` (rms) together."""
         total = 0.0
         for key in sorted(self.chosen, key=lambda key: self.part(key).size):
             total += self.part(key).size ** 2
@@ -133,10 +133,10 @@ class PartSelection:
             self.chosen -= {key}
 
     def fit_into(self, tables: int) -> None:
-        """Choose what takes off most with no more than `tables`.
+        """Choose the parts that correct most with at most `tables` tables.
 
-        Parts are taken away, cheapest first, and put together, most worth first; then the largest that are left out are
-        tried in the better of the two, in place of others.
+        Two selections are made: by removing parts, cheapest first, and by adding parts, most valuable first. In the
+        better one the largest dropped parts are then tried in place of others.
         """
         for key in sorted(self.chosen, key=lambda key: self.part(key).size):
             if self.total <= tables + MANY_MORE:
@@ -156,7 +156,7 @@ class PartSelection:
         self.chosen, self.silent, _ = best
 
     def _thin(self, tables: int) -> None:
-        """Leave out what costs least for the tables that it frees, until no more than `tables` are taken."""
+        """Drop parts with the least loss per freed table until at most `tables` are taken."""
         while self.total > max(tables, 0):
             if not self.chosen:
                 order = sorted(self.faces, key=lambda face: -abs(self.faces[face].constant))
@@ -165,12 +165,12 @@ class PartSelection:
             self.chosen -= {min(sorted(self.chosen, key=str), key=self._price)}
 
     def _price(self, key: Key) -> tuple[bool, float]:
-        """What a part costs for each table that it frees; parts that free none come last."""
+        """Loss per freed table by dropping a part; parts that free none sort last."""
         saved = self._change(key, self.chosen - {key})
         return saved >= 0, self.part(key).size ** 2 / max(-saved, 1)
 
     def _grow(self, whole: frozenset[Key], tables: int) -> None:
-        """Begin with nothing, and add what takes off most for the tables that it takes."""
+        """Start with no parts, and add those with the largest gain per table."""
         self.chosen = frozenset()
         self._thin(tables)
         room = tables - self.total
@@ -184,7 +184,7 @@ class PartSelection:
             room -= costs[best]
 
     def _change(self, key: Key, chosen: frozenset[Key]) -> int:
-        """How many tables more the axis takes if other parts are chosen."""
+        """Change of the number of tables of the axis of `key` with the selection `chosen`."""
         output, before = key[0][0], self.chosen
         now = self.tables(output)
         self.chosen = chosen
@@ -193,7 +193,7 @@ class PartSelection:
         return then - now
 
     def _layouts(self, face: OutputWay) -> tuple[TableLayout, TableLayout]:
-        """The layout of a face, and the same absorbed."""
+        """The layout of an (output, way), and the same absorbed."""
         numbers = tuple(n for n, _ in self._numbered(face) if (face, n) in self.chosen)
         key = (face, face in self.silent, numbers)
         if key not in self._known:
@@ -208,17 +208,18 @@ class PartSelection:
 
 
 def needed(output: int, layouts: Sequence[TableLayout], free: frozenset[int], beside: tuple[int, int] = (0, 0)) -> int:
-    """How many tables these layouts of an axis take, without that over the axis itself if that is free."""
+    """Number of tables of the layouts of an axis, without the table over the axis itself if that is free."""
     ways = {layout.way for layout in layouts if output in layout.sums or layout.constant}
     return tables_of(layouts, beside) - int(output in free and ways == {None})
 
 
 @frozen
 class Limits:
-    """What a control can hold.
+    """Limits of a control.
 
-    own_free  sums of an axis over itself go into tables of another kind
-    beside    tables more that it takes for each table that multiplies others, and for each that is multiplied
+    tables    largest number of tables; points: of nodes of a table
+    own_free  sums of an axis over itself go into tables of another kind, which do not count
+    beside    further tables for each table that multiplies others, and for each that is multiplied
     """
 
     tables: int
@@ -229,14 +230,12 @@ class Limits:
 
 @frozen
 class Scheme:
-    """Tables with one input each, sums and pairs; the second factor of a pair has no unit and is at most 1.
+    """Sums and pairwise products of one-input tables. The second factor of a product has no unit and is at most 1.
 
-    What they leave at the tip:
-
-    missed   the largest displacement that the tables lack at random poses, mm
-    rest     rms of what sums and products of pairs cannot say, mm
-    bound    what no sums and products of pairs could leave less than at the worst, mm
-    dropped  rms of what was left out because it is small or for want of tables, mm
+    missed   largest correction that the tables lack at random poses, mm at the tip
+    rest     rms of the part that no sums and products of pairs can hold, mm
+    bound    lower bound of the largest error of any sums and products of pairs, mm
+    dropped  rms of the parts dropped because they are small or tables are few, mm
     """
 
     tables: Compensation
@@ -248,7 +247,7 @@ class Scheme:
 
 @frozen
 class SchemeTask:
-    """A machine, where its tables are to hold, for which tool, how well (mm), and in which limits."""
+    """A machine, the space (n_axes, 2) and tool length (mm) for its tables, their target accuracy (mm), and limits."""
 
     machine: Machine
     space: Array
@@ -258,7 +257,7 @@ class SchemeTask:
 
 
 def automatic(task: SchemeTask, rotary: bool = True) -> Scheme:
-    """The tables of a machine; `rotary`: correct the rotary axes, too, as far as they can put the orientation right."""
+    """The tables of a machine; `rotary`: also correct the orientation by the rotary axes, as far as they can."""
     columns = np.flatnonzero(task.machine.rotary).tolist() if rotary else []
     most = task.limits.tables
     done = Scheme(Compensation(()), 0.0, 0.0, 0.0)
@@ -274,7 +273,7 @@ def automatic(task: SchemeTask, rotary: bool = True) -> Scheme:
 
 
 def _rotary(task: SchemeTask, columns: Sequence[int]) -> tuple[Scheme, int]:
-    """The tables of the rotary axes, as many as leave the linear axes with least that no pair can say."""
+    """The tables of the rotary axes and their number, chosen so that the linear axes can correct the rest best."""
     allowed = max(1, task.limits.tables // ROTARY_SHARE)
     tried: list[tuple[float, Scheme, int]] = []
     stage = Stage(task, columns, turning(task), LEVER)
@@ -284,12 +283,12 @@ def _rotary(task: SchemeTask, columns: Sequence[int]) -> tuple[Scheme, int]:
         if used < most and [each[-1] for each in tried[-2:]] == [used, used]:
             break
     least = min(bound for bound, _, _ in tried)
-    _, done, used = [each for each in tried if each[0] <= ALIKE * least][-1]
+    _, done, used = [each for each in tried if each[0] <= SAME_BOUND * least][-1]
     return done, used
 
 
 def _bound(task: SchemeTask, done: Scheme, count: int = NODES) -> float:
-    """How little the linear axes can leave at the worst where the rotary axes are corrected so, mm."""
+    """Lower bound, mm, of the largest error after correction of the linear axes, given the rotary tables `done`."""
     turns = [line.modulo for line in lines_of(task)]
     nodes = coarse_nodes(task.space, turns, count)
     evaluate = by_way(moving(task, done.tables))
@@ -298,12 +297,12 @@ def _bound(task: SchemeTask, done: Scheme, count: int = NODES) -> float:
 
 
 def turning(task: SchemeTask) -> Corrections:
-    """Corrections of the rotary axes, rad."""
+    """The corrections of the rotary axes, rad."""
     return lambda q, direction: rotary_correction(task.machine, q, State(task.tool_length, direction))
 
 
 def moving(task: SchemeTask, done: Compensation) -> Corrections:
-    """Corrections of the linear axes where the tables of the rotary axes have been at work, mm."""
+    """The corrections of the linear axes, mm, with the rotary axes corrected by the tables `done`."""
     columns = linear_axes(task.machine)
 
     def corrections(q: Array, direction: Array) -> Array:
@@ -315,10 +314,10 @@ def moving(task: SchemeTask, done: Compensation) -> Corrections:
 
 
 class Stage:
-    """Axes that are corrected together: what they need is worked out once, however many tables are tried for it."""
+    """Axes that are corrected together; their decomposition is computed once for any number of tables."""
 
     def __init__(self, task: SchemeTask, outputs: Sequence[int], correct: Corrections, scale: float) -> None:
-        """`correct`: the corrections of the outputs; `scale`: how much one unit of them counts, mm."""
+        """`correct`: the corrections of the outputs; `scale`: mm per unit of them."""
         self.task, self.scale = task, scale
         self.lines = lines_of(task)
         self.evaluate = by_way(lambda q, direction: scale * correct(q, direction))
@@ -330,11 +329,11 @@ class Stage:
 
     @property
     def turns(self) -> list[bool]:
-        """Which axes repeat after a turn."""
+        """For each axis, whether it repeats after a turn."""
         return [line.modulo for line in self.lines]
 
     def tables(self, most: int) -> tuple[Scheme, int]:
-        """The tables, and how many of the `most` they take."""
+        """The scheme with at most `most` tables, and their number."""
         selection, left = self.selection.again(), self.left
         allowed, used = most, most + 1
         while used > most:
@@ -349,13 +348,13 @@ class Stage:
         return Scheme(tables, missed, left.rms, selection.lost, left.bound), used
 
     def _followed(self, selection: PartSelection) -> dict[int, list[TableLayout]]:
-        """The layouts with their functions over all positions of the axes; what they need may show there only."""
+        """The layouts with their functions at fine positions, absorbed again with these values."""
         known = {output: selection.layouts(output) for output in selection.outputs}
         found = followed(self.sample, known, self.along)
         return {output: [absorbed(one, selection.tolerance) for one in each] for output, each in found.items()}
 
     def _along(self, axis: int, way: int | None) -> Array:
-        """The corrections along an axis, less what no pair of functions can say; see `AlongAxis`."""
+        """The corrections along an axis, less the remainder that no pairs can hold; see `AlongAxis`."""
         positions, places = self.lines[axis].fine, self.sample.places
         values = self.evaluate(self.sample.poses(axis, positions), way).reshape(len(positions), len(places), -1)
         return values if way is not None else values - self.left.along(axis, positions, places)
@@ -364,7 +363,7 @@ class Stage:
 def _parts(
     task: SchemeTask, outputs: Sequence[int], correct: Corrections, scale: float, nodes: Sequence[Array]
 ) -> tuple[PartSelection, Remainder]:
-    """The corrections of some axes, taken apart, and what no pair can say of them, left where it hurts least."""
+    """The decomposed corrections of some axes, and the remainder of least largest error that no pairs can hold."""
     enough = np.inf if task.machine.rotary[list(outputs)].any() else SMALL * task.target
     evaluate = by_way(correct)
     found: dict[OutputWay, Separation] = {}
@@ -383,7 +382,7 @@ def _parts(
 
 
 def ways_that_matter(machine: Machine) -> list[int]:
-    """The axes on whose direction of motion the errors depend."""
+    """Columns of the axes on whose direction of motion the errors depend."""
     names = machine.axis_names
     found = {
         names.index(effect.input if effect.input in names else effect.joint)
@@ -394,10 +393,10 @@ def ways_that_matter(machine: Machine) -> list[int]:
 
 
 def coarse_nodes(space: Array, turns: Sequence[bool], most: int = NODES) -> list[Array]:
-    """Where corrections are taken apart: evenly over each axis, but not so evenly that a screw's period could hide.
+    """Nodes of each axis for the decomposition, (n,), slightly uneven so that the period of a screw cannot be missed.
 
-    The ends of `space` (n_axes, 2), mm or rad, are among the nodes (n,) of each axis, since most is left there; of axes
-    that repeat (`turns`) they are not.
+    They include the ends of `space` (n_axes, 2), mm or rad, where errors are largest, except for axes that repeat
+    (`turns`).
     """
     count = min(most, int(most ** (FULL / len(space)) + 1e-9))
     shaken = np.arange(count) + 0.5 + 0.3 * (np.mod(np.arange(1, count + 1) * 0.618034, 1.0) - 0.5)
@@ -409,9 +408,9 @@ def coarse_nodes(space: Array, turns: Sequence[bool], most: int = NODES) -> list
 
 
 def lines_of(task: SchemeTask) -> tuple[AxisPositions, ...]:
-    """The positions that tables of each axis cover; those of an endless axis over whole turns repeat.
+    """The positions that tables of each axis cover. They repeat for an endless axis over a whole number of turns.
 
-    Over a turn and a part of one they do not: the control would repeat them with a period that is no turn.
+    Over a fraction of a turn they do not repeat: the control would use a period that is not a turn.
     """
     found = []
     features = task.machine.feature_lengths.tolist()

@@ -1,15 +1,15 @@
-"""The schemes of S. Esmaeili Marzdashti (PhD thesis, Polytechnique Montreal, 2021): tables of a form that is given.
+"""Table schemes of a fixed form, by S. Esmaeili Marzdashti (PhD thesis, Polytechnique Montreal, 2021).
 
 25Poly-T   chapter 5: each axis is corrected by a cubic polynomial of each axis; sums only.
 23Trigo-T  chapter 6: a linear function of each linear axis times a function of one rotary axis, for each linear axis;
-           Eq. 44 with the functions of the rotary axis alone that it lacks (L1, L8 and L15 are constants there, so that
-           neither EY0C nor the length of the tool can be said).
+           Eq. 44, plus functions of the rotary axis alone, which it lacks (L1, L8 and L15 are constants there, so that
+           neither EY0C nor the tool length can be represented).
 forward-inverse, chapter 7, for the chain w C A Y F X Z t with A tilted by any angle: exact for the eight location
            errors, the spindle's place and the three gains. In 40 tables, the thesis's number: one for each of the
            functions sin A, cos A, sin 2A, cos^2 A (or sin^2 A), by which linear tables are multiplied. In 20: the
            functions of A are put together, and multiplied by X, Y and Z.
 
-The coefficients are the least squares of the exact correction over the working space; where a form is exact that is it.
+The coefficients are fitted to the exact correction over the working space by least squares.
 """
 
 from __future__ import annotations
@@ -67,14 +67,14 @@ def _cubic(rotary: bool, constant: bool) -> Basis:
 
 @frozen
 class Piece:
-    """A table of a form that is given: functions of an axis, times a known function of another axis if there is one."""
+    """A table of a fixed form: basis functions of an axis, times a known function of another axis (`centre`), if any."""
 
     axis: int
     basis: Basis
     centre: tuple[int, Function] | None = None
 
     def columns(self, q: Array) -> Array:
-        """What its coefficients are multiplied by at poses q, (n, k)."""
+        """Values of the basis functions at poses q (n, n_axes), (n, k)."""
         own = self.basis(q[:, self.axis])
         if self.centre is None:
             return own
@@ -83,7 +83,7 @@ class Piece:
 
 
 Form = Callable[[int], Sequence[Piece]]
-"""The tables that correct an axis (its column)."""
+"""Column of an axis -> the tables that correct it."""
 
 
 def fixed(task: SchemeTask, name: str) -> Scheme:
@@ -149,7 +149,7 @@ def _rotary(machine: Machine, name: str) -> list[int]:
 
 
 def _made(task: SchemeTask, form: Form) -> Scheme:
-    """Rotary axes first; the linear ones then correct what is left where that leads."""
+    """The tables of a form: first for rotary axes; linear axes then correct the rest. Raises `RefusedError` NCF484."""
     done = _fitted(task, np.flatnonzero(task.machine.rotary).tolist(), form, turning(task), LEVER)
     moved = _fitted(task, linear_axes(task.machine), form, moving(task, done.tables), 1.0)
     tables = Compensation((*done.tables.terms, *moved.tables.terms))
@@ -161,7 +161,7 @@ def _made(task: SchemeTask, form: Form) -> Scheme:
 
 
 def _fitted(task: SchemeTask, outputs: Sequence[int], form: Form, correct: Corrections, scale: float) -> Scheme:
-    """The tables of some axes."""
+    """The tables that correct some axes, with coefficients by least squares."""
     if not outputs:
         return Scheme(Compensation(()), 0.0, 0.0, 0.0)
     q = random_poses(task.space, POSES, seed=21)

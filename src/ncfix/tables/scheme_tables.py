@@ -1,11 +1,11 @@
-"""From a layout that is known at a few nodes to tables: its functions at any position, at as few nodes as will do.
+"""Tables from a layout whose functions are known at a few nodes: functions at all positions, then few table nodes.
 
-At a new position of one axis the correction is linear in the values there of all functions of that axis, with factors
-that are known from the nodes of the others: a least-squares problem with a handful of unknowns and one matrix for all
-positions. The functions so found are the exact ones where the layout is exact, and the best there are where it is not.
+At a new position of one axis the correction is linear in the values of all functions of that axis, with factors known
+from the nodes of the other axes: a least-squares problem with a few unknowns and one matrix for all positions. The
+functions found are exact if the layout is, else the best fit.
 
-Functions are looked at in many fine steps; a table takes a number of steps that divides them, so that its nodes are
-among the positions that are known. A file can say them exactly: the first one, the step, and a whole number of steps.
+Functions are evaluated in many fine steps. A table uses a divisor of their number, so its nodes are among the known
+positions, and a file can state them exactly: the first position, the step, and the number of steps.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from ncfix.tables.separable import Star, TableLayout
 from ncfix.values import frozen
 
 SCALE = 10**4
-"""Positions and steps have four decimals, mm or degree."""
+"""Units per mm or degree of positions and steps: four decimals."""
 STEPS = ((120, 160, 200), (240, 320, 400), (720, 800, 640), (1440, 1600, 1280))
-"""How many fine steps, from coarse to fine: numbers with many divisors. The first that divides the range is taken."""
+"""Numbers of fine steps, from coarse to fine, with many divisors; within a group the first that divides the range."""
 PER_FEATURE = 3
-"""Steps for each length within which the errors may bend."""
+"""Smallest number of steps within the length over which errors bend."""
 SAMPLES = 7
-"""Two to this power combinations of nodes of the other axes are looked at for each position."""
+"""Base-2 logarithm of the number of combinations of nodes of the other axes at each position."""
 SOBOL = (
     *((0, (1,)), (1, (1, 3)), (1, (1, 3, 1)), (2, (1, 1, 1)), (1, (1, 1, 3, 3)), (4, (1, 3, 5, 13))),
     *((2, (1, 1, 5, 5, 17)), (4, (1, 1, 5, 5, 5)), (7, (1, 1, 7, 11, 19))),
@@ -39,17 +39,17 @@ Slot = tuple[int, int | None]
 """A function of one axis in a layout: (star, leaf axis), (star, None) its centre, or (-1, axis) a sum."""
 Curves = dict[Slot, Array]
 Evaluate = Callable[[Array, int | None], Array]
-"""Corrections of all outputs at poses (n, n_axes), (n, n_outputs): without direction, or what changes with a way."""
+"""Poses (n, n_axes), way -> corrections (n, n_outputs) without direction, or the part that changes with that way."""
 TableLayouts = Mapping[int, Sequence[TableLayout]]
 """Output -> its layouts. The outputs are in the order in which `Evaluate` has them."""
 AlongAxis = Callable[[int, int | None], Array]
-"""What layouts are to say at all fine positions of an axis and combinations of the others, (n, m, n_outputs)."""
+"""Axis, way -> corrections at all its fine positions and combinations of the other axes, (n, m, n_outputs)."""
 ROUNDS = 6
 CHECKS = 1000
 GAIN = 0.95
-"""A round of smaller steps that leaves more than this share of what was missed is the last."""
+"""Ratio of the errors of two rounds of smaller steps above which the search ends."""
 Corrections = Callable[[Array, Array], Array]
-"""What to add to some axes at commands (n, n_axes) reached in directions (n, n_axes) or (n_axes,): (n, n_outputs)."""
+"""Commands (n, n_axes), directions (n, n_axes) or (n_axes,) -> corrections to add to some axes, (n, n_outputs)."""
 
 
 @frozen
@@ -57,8 +57,8 @@ class AxisPositions:
     """The positions of an axis that tables cover, in its file unit (mm, degree).
 
     unit    mm or rad per file unit
-    steps   into how many it is divided
-    modulo  they repeat
+    steps   number of fine steps
+    modulo  whether the table repeats
     """
 
     name: str
@@ -70,7 +70,7 @@ class AxisPositions:
 
     @classmethod
     def over(cls, name: str, low: float, high: float, unit: float, feature: float, modulo: bool) -> AxisPositions:
-        """With steps small enough for errors that may bend within the length `feature` (file unit)."""
+        """Positions in steps small enough for errors that bend within the length `feature` (file unit)."""
         wanted = PER_FEATURE * (high - low) / feature
         choices = next((some for some in STEPS if some[0] >= wanted), STEPS[-1])
         whole = round((high - low) * SCALE)
@@ -79,15 +79,15 @@ class AxisPositions:
 
     @property
     def fine(self) -> Array:
-        """All positions (steps + 1,), from low to high or less than one part in a thousand beyond it, mm or rad."""
+        """All fine positions (steps + 1,), mm or rad; the last is at `high`, or beyond it by less than 0.1 %."""
         first = np.floor(self.low * SCALE + 1e-6)
         step = np.ceil((self.high * SCALE - first) / self.steps - 1e-6)
         return (first + step * np.arange(self.steps + 1)) / SCALE * self.unit
 
     def stride(self, curve: Array, most: int, limit: float) -> int:
-        """The widest step, in fine ones, with which straight lines stay within `limit` of a curve over `fine`.
+        """The largest step, in fine steps, at which straight lines are within `limit` of a curve over `fine`.
 
-        No more than `most` nodes. What repeats takes two steps at least.
+        most  largest number of nodes. A table that repeats has at least two steps.
         """
         strides = [s for s in range(self.steps, 0, -1) if self.steps % s == 0 and self.steps // s < most]
         for stride in strides[1:] if self.modulo else strides:
@@ -103,25 +103,28 @@ class AxisPositions:
 
 @frozen
 class TableSample:
-    """Where functions of one axis are looked for: combinations of nodes of all axes, (m, n_axes), their numbers."""
+    """Combinations of nodes of all axes at which functions of one axis are fitted.
+
+    nodes   for each axis, its nodes; places (m, n_axes): indices of the nodes of each combination
+    """
 
     nodes: Sequence[Array]
     places: Index
 
     @classmethod
     def of(cls, nodes: Sequence[Array]) -> TableSample:
-        """Spread evenly over pairs and triples of axes (a Sobol net)."""
+        """Combinations that fill all pairs and triples of axes evenly (a Sobol net)."""
         unit = _sobol_net(len(nodes))
         counts = np.array([len(line) for line in nodes])
         return cls(nodes, np.floor(unit * counts).astype(np.intp))
 
     def poses(self, axis: int, positions: Array) -> Array:
-        """The poses with one axis at positions (n,): (n * m, n_axes)."""
+        """The poses of all combinations with one axis at positions (n,) instead: (n * m, n_axes)."""
         rest = np.stack([line[column] for line, column in zip(self.nodes, self.places.T, strict=True)], axis=1)
         return poses_along(axis, positions, rest)
 
     def curves(self, layout: TableLayout, axis: int, values: Array) -> Curves:
-        """All functions of the layout over this axis, from its values (n, m) at `poses`: slot -> (n,)."""
+        """The functions of the layout over an axis, fitted to values (n, m) at `poses`: slot -> (n,)."""
         slots, known = self._columns(layout, axis)
         if not slots:
             return {}
@@ -130,7 +133,7 @@ class TableSample:
         return dict(zip(slots, found, strict=True))
 
     def _columns(self, layout: TableLayout, axis: int) -> tuple[Curves, Array]:
-        """The factors of the unknown functions, and the sum of all that does not depend on the axis, (m,) each."""
+        """Factors of the unknown functions of an axis, and the sum of the parts that do not depend on it, (m,) each."""
         slots: Curves = {}
         known = np.full(len(self.places), layout.constant)
         for other, values in layout.sums.items():
@@ -152,9 +155,9 @@ class TableSample:
 
 
 def _sobol_net(dimensions: int) -> Array:
-    """The first points of Sobol's sequence, (2 ** SAMPLES, dimensions) from 0 to 1: that of SciPy, which imports much.
+    """The first points of Sobol's sequence in 0 ... 1, (2 ** SAMPLES, dimensions).
 
-    Direction numbers of S. Joe and F. Y. Kuo (2008).
+    The same as SciPy's, whose import is slow. Direction numbers of S. Joe and F. Y. Kuo (2008).
     """
     if dimensions > 1 + len(SOBOL):
         from scipy.stats import qmc
@@ -178,7 +181,7 @@ def _sobol_net(dimensions: int) -> Array:
 
 
 def followed(sample: TableSample, layouts: TableLayouts, along: AlongAxis) -> dict[int, list[TableLayout]]:
-    """These layouts with their functions at the fine positions of each axis."""
+    """The layouts with their functions fitted at the fine positions of each axis."""
     curves: dict[tuple[int, int | None], Curves] = {}
     for axis in range(len(sample.nodes)):
         concerned = [(output, one) for output, each in layouts.items() for one in each if axis in one.axes]
@@ -192,7 +195,7 @@ def followed(sample: TableSample, layouts: TableLayouts, along: AlongAxis) -> di
 
 
 def _with(layout: TableLayout, curves: Curves) -> TableLayout:
-    """The layout with other values."""
+    """The layout with the values of its functions replaced."""
     stars = [
         Star(star.axis, curves[number, None], {leaf: curves[number, leaf] for leaf in star.leaves})
         for number, star in enumerate(layout.stars)
@@ -201,7 +204,7 @@ def _with(layout: TableLayout, curves: Curves) -> TableLayout:
 
 
 def by_way(corrections: Corrections) -> Evaluate:
-    """Corrections without direction, and the half of the difference that the way of one axis makes."""
+    """Corrections without direction (way None), or half their difference between both directions of one axis."""
 
     def evaluate(q: Array, way: int | None) -> Array:
         direction = np.zeros(q.shape[1])
@@ -214,7 +217,7 @@ def by_way(corrections: Corrections) -> Evaluate:
 
 
 def checked(lines: Sequence[AxisPositions], correct: Corrections) -> tuple[Array, Array, Array]:
-    """Random poses and ways, and the corrections there: what tables are judged by."""
+    """Random poses, directions of motion, and the corrections there, by which tables are judged."""
     space = np.array([(line.low * line.unit, line.high * line.unit) for line in lines])
     q, ways = random_poses(space, CHECKS, seed=3), random_ways(len(space), CHECKS, seed=4)
     return q, ways, correct(q, ways)
@@ -222,12 +225,12 @@ def checked(lines: Sequence[AxisPositions], correct: Corrections) -> tuple[Array
 
 @frozen
 class StagedTables:
-    """Axes that are corrected together.
+    """The tables of axes that are corrected together.
 
-    lines    all axes of the machine
-    layouts  output (its column) -> layouts with functions over the fine positions, mm or rad
-    checked  poses, ways and corrections of the outputs there, in the order of `layouts`
-    scale    how much one unit of them counts, mm
+    lines    positions of all axes of the machine
+    layouts  column of an output -> layouts with functions over the fine positions, mm or rad
+    checked  poses, directions and corrections of the outputs there, in the order of `layouts`
+    scale    mm per unit of the outputs
     """
 
     lines: Sequence[AxisPositions]
@@ -236,9 +239,9 @@ class StagedTables:
     scale: float = 1.0
 
     def settled(self, target: float, points: int, left: float = 0.0) -> tuple[Compensation, float]:
-        """Tables that miss at most `target` (mm) if that many points allow it, and what they miss.
+        """Tables that miss at most `target`, mm, if `points` nodes per table allow it; and what they miss, mm.
 
-        left  mm that they miss anyway: it need not get better than that
+        left  unavoidable error, mm, below which the tables need not go
         """
         parts = sum(len(one.sums) + len(one.stars) for each in self.layouts.values() for one in each)
         limit = target / np.sqrt(max(parts, 1)) / self.scale
@@ -274,7 +277,7 @@ class StagedTables:
         return Compensation(tuple(terms))
 
     def _sums(self, output: int, layouts: Sequence[TableLayout], limit: float, points: int) -> Iterator[Term]:
-        """A table for each axis, or one for either way; what changes with the way is joined to what does not."""
+        """The sums: one table for each axis, or two if the sum over it changes with the direction."""
         plain: dict[int, Array] = {}
         for layout in layouts:
             if layout.way is None:
@@ -291,7 +294,7 @@ class StagedTables:
                 yield Term((self._nodes(output, axis, curve, stride),), (self.lines[axis].name, sense))
 
     def _star(self, output: int, way: int | None, star: Star, limit: float, points: int) -> Iterator[Term]:
-        """The centre has no unit, is 1 at most, and its largest value is positive; each leaf points at it."""
+        """The products of a star. The centre has no unit, and its value of largest size is 1."""
         weight = sum(float(np.abs(values).max()) for values in star.leaves.values())
         centre = self._grid(output, star.axis, star.centre, limit / max(weight, 1e-30), points)
         largest = float(centre.values.flat[np.argmax(np.abs(centre.values))]) or 1.0

@@ -1,14 +1,15 @@
-"""A function of several axes as tables: taken apart, and put into the fewest sums and pairwise products.
+"""Decomposition of a function of several axes into the fewest one-axis tables, their sums and pairwise products.
 
-A chain of axes turns and shifts one after the other, so that a correction is a sum of products of functions of one axis
-each (sines, cosines, positions, errors). Which they are need not be known: on a full grid of positions the mean over
-the other axes leaves what depends on one axis, or on two; and of two axes the singular value decomposition finds the
-fewest products. The parts are orthogonal: leaving one out costs exactly its own size, and what is kept is the best fit
-in the mean square that sums and products of pairs can make. What is left over is the rest: it needs three axes at once.
+The axes of a chain rotate and shift one after the other, so a correction is a sum of products of functions of one axis
+each (sines, cosines, positions, errors). These need not be known: on a full grid of positions the mean over the other
+axes gives the part that depends on one axis, or on two; for two axes the singular value decomposition gives the fewest
+products. The parts are orthogonal: dropping one costs exactly its own size, and the others remain the best fit in the
+mean square. The rest depends on three or more axes at once.
 
-A control that multiplies tables by pairs lets many of them point at the same other one. A product therefore is a leaf
-of a star: the centre is the table that is pointed at, and each leaf a table that points. Sharing a centre, writing it
-as a multiple of another, and hiding a sum in a factor, (a + f(q)) g(p) = a g(p) + f(q) g(p), all save tables.
+A control that multiplies pairs of tables lets several tables refer to the same other one. Products are therefore
+arranged as stars: the centre is the table referred to, the leaves are the tables that refer to it. Tables are saved by
+sharing a centre, by writing it as a multiple of another, and by hiding a sum in a factor:
+(a + f(q)) g(p) = a g(p) + f(q) g(p).
 """
 
 from __future__ import annotations
@@ -24,15 +25,15 @@ from ncfix.arrays import Array
 from ncfix.values import frozen
 
 NOISE = 2e-6
-"""mm: below what is solved for, and far below what any control resolves."""
+"""Size, mm rms, below which a part counts as rest: far below the resolution of any control."""
 EXHAUSTIVE = 6
-"""Up to so many pairs of axes every way of choosing the centres is tried."""
-ALIKE = 0.05
-"""Functions whose difference is below this share of themselves are not told apart."""
+"""Largest number of pairs of axes for which all choices of centres are tried."""
+MIN_CONDITION = 0.05
+"""Relative singular value below which columns count as dependent in a combination."""
 KNOWN = 10_000
-"""So many combinations are remembered."""
+"""Size of the caches of combinations."""
 SURELY = 1 + 1e-6
-"""One column that misses by more than this times what it may does not fit, however its share is rounded."""
+"""Factor on the tolerance beyond which a single column cannot fit, despite rounding."""
 
 
 @frozen
@@ -44,13 +45,13 @@ class Single:
 
     @property
     def size(self) -> float:
-        """How much it matters: rms."""
+        """Root mean square of the values."""
         return float(np.sqrt(np.mean(self.values**2)))
 
 
 @frozen
 class Product:
-    """size * first * second: functions of two axes with rms 1, at their nodes."""
+    """The product size * first * second; first and second are functions of the two axes with rms 1, at the nodes."""
 
     axes: tuple[int, int]
     first: Array
@@ -71,7 +72,7 @@ Part = Single | Product
 
 @frozen
 class Separation:
-    """What a function consists of, largest first; `rest` is the rms of what no pair of axes can say."""
+    """The parts of a function, largest first; rest: rms of what depends on three or more axes."""
 
     constant: float
     parts: tuple[Part, ...]
@@ -79,14 +80,14 @@ class Separation:
 
 
 def taken_apart(values: Array) -> Separation:
-    """The parts of a function on a full grid, values (m_1, ..., m_n); those below `NOISE` (rms) belong to the rest."""
+    """Decompose a function on a full grid, values (m_1, ..., m_n); parts below `NOISE` (rms) belong to the rest."""
     constant = float(values.mean())
     axes = range(values.ndim)
     return _peeled(constant, values - constant, [*((axis,) for axis in axes), *combinations(axes, 2)])
 
 
 def taken_apart_along(values: Array, axis: int) -> Separation:
-    """As `taken_apart`, with every part a function of `axis` at least: what changes sign with the way that axis moves.
+    """As `taken_apart`, for a function that changes sign with the direction of `axis`: every part depends on `axis`.
 
     A function of another axis alone becomes a product with a constant.
     """
@@ -95,7 +96,7 @@ def taken_apart_along(values: Array, axis: int) -> Separation:
 
 
 def _peeled(constant: float, left: Array, sets: Sequence[tuple[int, ...]]) -> Separation:
-    """Take off what depends on each of some axes or pairs of axes in turn: the mean over the others."""
+    """Subtract for each of `sets`, axes or pairs, the mean over the other axes, and collect these parts."""
     found: list[Part] = []
     for subset in sets:
         mean = left.mean(axis=tuple(axis for axis in range(left.ndim) if axis not in subset), keepdims=True)
@@ -121,7 +122,7 @@ def products(both: Array, pair: tuple[int, int]) -> list[Product]:
 
 @frozen
 class Star:
-    """A table over `axis` that others are multiplied by: centre (m,), no unit; leaves: axis -> values, mm or rad."""
+    """Products with a common factor: centre (m,), without unit, over `axis`; leaves: axis -> values, mm or rad."""
 
     axis: int
     centre: Array
@@ -132,7 +133,7 @@ class Star:
 class TableLayout:
     """A function as tables: a constant, sums (axis -> values) and stars.
 
-    way  the axis with whose direction of motion all of it changes sign; None for what does not
+    way  the axis with whose direction of motion the function changes sign; None if it does not
     """
 
     sums: Mapping[int, Array] = field(default_factory=dict)
@@ -142,7 +143,7 @@ class TableLayout:
 
     @property
     def axes(self) -> frozenset[int]:
-        """The axes that it looks up."""
+        """The axes on which the layout depends."""
         centres = {star.axis for star in self.stars}
         return frozenset({*self.sums, *centres, *(axis for star in self.stars for axis in star.leaves)})
 
@@ -156,7 +157,7 @@ class TableLayout:
         return TableLayout(sums, tuple(stars), self.way, factor * self.constant)
 
     def at(self, places: Array) -> Array:
-        """Its values where axis j stands at its node places[:, j], (n,); whole numbers."""
+        """Values (n,) with axis j at its node of index places[:, j]."""
         total = np.full(len(places), self.constant)
         for axis, values in self.sums.items():
             total += values[places[:, axis]]
@@ -167,11 +168,12 @@ class TableLayout:
 
 
 def tables_of(layouts: Sequence[TableLayout], beside: tuple[int, int] = (0, 0)) -> int:
-    """How many tables absorbed layouts take to correct one axis: that without direction, and those for ways of axes.
+    """Number of tables that absorbed layouts take to correct one axis: the one without direction, and those with one.
 
-    A constant without sums is a table, too. What changes with the way takes a table for either way; a sum shares the
-    pair with the table that is there anyway. beside: tables more for each table that multiplies others, and for each
-    that is multiplied, where the control adds these by themselves too and that must be taken off again.
+    A constant without sums is a table. A part that changes with direction takes a table for each direction; a sum
+    shares these two with the table without direction.
+    beside  further tables for each table that multiplies others, and for each that is multiplied, if the control also
+            adds these by themselves, which must be compensated
     """
     multiplier, multiplied = beside
     plain = {axis for layout in layouts if layout.way is None for axis in layout.sums}
@@ -185,9 +187,9 @@ def tables_of(layouts: Sequence[TableLayout], beside: tuple[int, int] = (0, 0)) 
 
 
 def arranged(parts: Sequence[Part], constant: float, way: int | None, tolerance: float) -> TableLayout:
-    """The layout that takes the fewest tables once it is `absorbed`; it is not, yet.
+    """The layout that takes the fewest tables after `absorbed`, which is not yet applied.
 
-    What changes with the way of an axis has that axis as the leaf of every product.
+    A part that changes with the direction of an axis has that axis as the leaf of every product.
     tolerance  rms that may be lost by writing a factor as a combination of others
     """
     singles = {part.axis: part.values for part in parts if isinstance(part, Single)}
@@ -198,7 +200,7 @@ def arranged(parts: Sequence[Part], constant: float, way: int | None, tolerance:
 
 
 def _choices(pairs: Sequence[Product]) -> Iterator[dict[tuple[int, int], int]]:
-    """Which axis of each pair is the centre: all ways, or the obvious ones if there are too many."""
+    """Choices of the centre axis of each pair: all, or if these are too many, those that prefer a subset of axes."""
     axes = list(dict.fromkeys(part.axes for part in pairs))
     if len(axes) <= EXHAUSTIVE:
         for sides in product((0, 1), repeat=len(axes)):
@@ -211,7 +213,7 @@ def _choices(pairs: Sequence[Product]) -> Iterator[dict[tuple[int, int], int]]:
 
 
 def _stars(pairs: Sequence[Product], centres: Mapping[tuple[int, int], int], tolerance: float) -> list[Star]:
-    """Products put together, largest first: into the centres that are there if that takes no more tables."""
+    """The products as stars, largest first; a product joins existing centres if that takes no more tables."""
     stars: list[Star] = []
     for part in pairs:
         axis = centres[part.axes]
@@ -229,7 +231,7 @@ def _stars(pairs: Sequence[Product], centres: Mapping[tuple[int, int], int], tol
 
 
 def _shares(part: Product, axis: int, centres: Sequence[Array], tolerance: float) -> list[float] | None:
-    """The factor as a combination of centres, if it is one to within the tolerance; shares that do not matter are 0."""
+    """The factor of a product over `axis` as a combination of centres; None if none is within the tolerance."""
     if not centres:
         return None
     return _as_shares(part.on(axis).tobytes(), part.size, tuple(centre.tobytes() for centre in centres), tolerance)
@@ -237,7 +239,7 @@ def _shares(part: Product, axis: int, centres: Sequence[Array], tolerance: float
 
 @lru_cache(KNOWN)
 def _as_shares(goal_bytes: bytes, size: float, centres: tuple[bytes, ...], tolerance: float) -> list[float] | None:
-    """What `_shares` says of a factor of a product of this size."""
+    """Cached part of `_shares`; negligible shares are 0. `size`: that of the product."""
     goal, columns = np.frombuffer(goal_bytes), np.stack([np.frombuffer(centre) for centre in centres], axis=1)
     shares = np.linalg.lstsq(columns, goal, rcond=None)[0]
     shares[np.abs(shares) * size * _rms(columns) <= tolerance] = 0.0
@@ -247,9 +249,9 @@ def _as_shares(goal_bytes: bytes, size: float, centres: tuple[bytes, ...], toler
 
 
 def absorbed(layout: TableLayout, tolerance: float) -> TableLayout:
-    """This function with fewer tables: sums hidden in the factors of products, where they are multiples of them.
+    """The same function with fewer tables: sums that are combinations of factors of products are hidden in these.
 
-    The values may be those at the nodes or at any other positions. The constant goes into a sum, if there is one.
+    The values may be those at nodes or at any other positions. The constant goes into a sum if there is one.
     """
     sums, stars, constant = dict(layout.sums), list(layout.stars), layout.constant
     if layout.way is None:
@@ -267,7 +269,7 @@ def absorbed(layout: TableLayout, tolerance: float) -> TableLayout:
 
 
 def _hide_in_leaves(sums: dict[int, Array], stars: list[Star], constant: float, axis: int, tolerance: float) -> float:
-    """A sum that is a combination of centres over the same axis: each share is added to a leaf of that centre."""
+    """Hide a sum that is a combination of centres over its axis: add each share to a leaf. Returns the constant."""
     own = [index for index, star in enumerate(stars) if star.axis == axis]
     fit = _combination(sums[axis], [stars[index].centre for index in own], tolerance)
     if fit is None:
@@ -280,7 +282,10 @@ def _hide_in_leaves(sums: dict[int, Array], stars: list[Star], constant: float, 
 
 
 def _hide_in_centres(sums: dict[int, Array], stars: list[Star], constant: float, axis: int, tolerance: float) -> float:
-    """A sum that is a combination of leaves over the same axis: the centres are shifted, if that saves a table."""
+    """Hide a sum that is a combination of leaves over its axis by shifting the centres, if that saves a table.
+
+    Returns the constant.
+    """
     own = [index for index, star in enumerate(stars) if axis in star.leaves]
     fit = _combination(sums[axis], [stars[index].leaves[axis] for index in own], tolerance)
     if fit is None:
@@ -304,9 +309,9 @@ def _hide_in_centres(sums: dict[int, Array], stars: list[Star], constant: float,
 
 
 def _combination(values: Array, columns: Sequence[Array], tolerance: float) -> list[float] | None:
-    """Constant and shares of the columns that make up the values to within the tolerance.
+    """Constant and shares of columns that reproduce the values to within the tolerance (rms); None if none do.
 
-    Columns that are nearly the same count as one, lest large shares cancel.
+    Nearly equal columns count as one, so that no large shares cancel.
     """
     if not columns:
         return None
@@ -315,7 +320,7 @@ def _combination(values: Array, columns: Sequence[Array], tolerance: float) -> l
 
 @lru_cache(KNOWN)
 def _combined(goal_bytes: bytes, column_bytes: tuple[bytes, ...], tolerance: float) -> list[float] | None:
-    """What `_combination` says; the search for few tables asks for the same again and again."""
+    """Cached part of `_combination`; the search for few tables repeats the same questions."""
     values, together = np.frombuffer(goal_bytes), np.stack([np.frombuffer(column) for column in column_bytes])
     mean = values.mean()
     means = together.mean(axis=1)
@@ -326,7 +331,7 @@ def _combined(goal_bytes: bytes, column_bytes: tuple[bytes, ...], tolerance: flo
     design = centred / sizes[:, None]
     if len(design) == 1 and _rms(goal - np.mean(design[0] * goal) * design[0]) > SURELY * tolerance:
         return None
-    scaled = np.linalg.lstsq(design.T, goal, rcond=ALIKE)[0]
+    scaled = np.linalg.lstsq(design.T, goal, rcond=MIN_CONDITION)[0]
     if _rms(design.T @ scaled - goal) > tolerance:
         return None
     shares = scaled / sizes

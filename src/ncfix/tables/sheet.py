@@ -1,4 +1,4 @@
-"""The hand-over sheet: what whoever loads the tables must know, on a page. Markdown, and the same as HTML."""
+"""The hand-over sheet: one page with all that a person who loads the tables must know, as Markdown and HTML."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CLASSES = {
     "R-VOL": "the position of the tip over linear and rotary axes together.",
     "R-VOL+": "the same, and the direction of the tool.",
 }
-"""What ISO/TR 16907 means by them: what of the machine's errors is corrected."""
+"""Class of ISO/TR 16907 -> the errors that it corrects, in words."""
 BEFORE = (
     "Save all parameters and compensation data of the control, in a place from which they can be loaded again.",
     "Leave in force what the control compensated while the machine was measured: these tables come on top of it. Where "
@@ -32,16 +32,16 @@ BEFORE = (
     "and keep a hand at the emergency stop: if a sign or a unit is wrong, it shows as a jump when the tables come on.",
     "Before the machine cuts again: measure as in the last step, and run one program above the part.",
 )
-"""What is the same with every control."""
+"""Steps before loading tables, the same for every control."""
 JUMP = 1.5
-"""How many times the largest correction no axis may move by."""
+"""Factor on the largest correction: no axis may move further when the tables come on."""
 STYLE = "body{font:15px/1.45 sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#222}li{margin:.2em 0}"
 LONGER = 50.0
-"""mm: the tool with which it is shown what another length leaves."""
+"""Additional tool length, mm, for which the error is also stated."""
 
 
 def as_markdown(control: Control, request: Request, tables: Tables, left: Residual, written: Written) -> str:
-    """The sheet."""
+    """The sheet as Markdown."""
     return "\n".join(_lines(control, request, tables, left, written)) + "\n"
 
 
@@ -105,7 +105,9 @@ def _length_note(request: Request, tables: Tables) -> str:
 
 
 def _checks(request: Request, tables: Tables) -> Iterator[str]:
-    """Corrections in the middle of the travel, and where each axis is corrected most half-way from there to corners."""
+    """Poses with corrections, to check the control: the middle of the travel, and for each axis the pose of its largest
+    correction among those half-way to the corners.
+    """
     names, units = request.machine.axis_names, np.array([axis.unit for axis in request.machine.axes])
     space = request.space.mean(axis=1)[:, None] + (request.space - request.space.mean(axis=1)[:, None]) / 2
     q = np.concatenate([space.mean(axis=1)[None], corners(space)])
@@ -127,7 +129,7 @@ def _moved(value: float, rotary: bool, sign: str = "") -> str:
 
 
 def as_html(markdown: str) -> str:
-    """The sheet as a page of its own: headings, lists and paragraphs are all that it has."""
+    """The sheet as an HTML page; it consists of headings, lists and paragraphs only."""
     body: list[str] = []
     opened = ""
     for line in markdown.splitlines():
@@ -153,7 +155,7 @@ def as_html(markdown: str) -> str:
 
 
 def _kind(line: str) -> tuple[str, str]:
-    """The element that a line of the sheet makes, and its text."""
+    """The HTML element of a line of the sheet, and its text."""
     if line.startswith("## "):
         return "h2", line[3:]
     if line.startswith("# "):

@@ -1,7 +1,6 @@
-"""What the table files of controls have in common: axes by their letters, numbers, and faults with their places.
+"""Common parts of the table files of controls: axis letters and units, numbers, and remarks with places.
 
-A letter tells whether a position is in millimetres or degree. The linters of the plugins say what is wrong in a file
-with `Remarks`.
+The letter of an axis tells whether positions are in millimetres or degree. Linters collect faults in `Remarks`.
 """
 
 from __future__ import annotations
@@ -19,21 +18,21 @@ from ncfix.machine import Machine
 from ncfix.values import mutable
 
 AGAIN = "export again"
-"""What helps with a file that ncfix has written."""
+"""Hint for a faulty file that ncfix has written."""
 NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 """The pattern of a decimal number as controls write it."""
 ALONE = re.compile(r"\r(?!\n)")
 BYTE_ORDER = "\u00ef\u00bb\u00bf"
 """The mark at the beginning of some UTF-8 files, taken as Latin-1."""
 ORDER = "XYZABCUVW"
-"""In which order controls count them."""
+"""Axis letters in the order in which controls count axes."""
 TURNING = "ABC"
 DEGREE = np.pi / 180
 
 
 @lru_cache(1 << 16)
 def as_number(text: str) -> float | None:
-    """A decimal number as controls write it, finite; None for anything else."""
+    """A finite decimal number as controls write it; None for any other text."""
     if not re.fullmatch(NUMBER, text):
         return None
     found = float(text)
@@ -42,9 +41,12 @@ def as_number(text: str) -> float | None:
 
 @mutable
 class Remarks:
-    """What was found in one file so far. `wrong` is what the control would not load or would misread.
+    """Faults found in one file.
 
-    open_end  the last line does not end as lines do
+    rows      the lines of the file
+    wrong     faults for which the control would not load the file or would misread it
+    doubtful  contents that are rarely intended
+    open_end  the last line has no line end
     """
 
     path: str
@@ -55,9 +57,9 @@ class Remarks:
 
     @classmethod
     def of(cls, path: str, content: bytes, comment: str = "") -> Remarks:
-        """An empty list for a file; a byte that is not ASCII is noted, once: after a `comment` it is only doubtful.
+        """The remarks on a file before its content is checked: on byte order mark, line ends, non-ASCII characters.
 
-        comment  the pattern of what a comment begins with; "" where there are none
+        comment  pattern of the start of a comment, in which non-ASCII characters are only doubtful; "": no comments
         """
         text = content.decode("latin-1")
         remarks = cls(path, _rows(text.removeprefix(BYTE_ORDER)), open_end=not text.endswith(("\n", "\r")))
@@ -74,26 +76,26 @@ class Remarks:
         return remarks
 
     def refuse(self, line: int, text: str, hint: str = AGAIN) -> None:
-        """NCF491: the control would not load this, or read it otherwise than it looks."""
+        """Note NCF491: the control would not load this line, or would misread it."""
         self.wrong.append(Message("NCF491", text, self._place(line), hint))
 
     def doubt(self, line: int, text: str, hint: str = "") -> None:
-        """NCF492: this is rarely meant."""
+        """Note NCF492: this is rarely intended."""
         self.doubtful.append(Message("NCF492", text, self._place(line), hint))
 
     def doubt_end(self) -> None:
-        """Remark on an open end of a file in which nothing says that it is whole: its last number may lack digits."""
+        """Note a missing line end, for a format without an end mark: the last number may lack digits."""
         if self.open_end and self.rows:
             self.doubt(len(self.rows), "the last line does not end: was the file cut off?", "a line end behind it")
 
     def check(self) -> None:
-        """Raise `ConfigError` with everything that is wrong, if anything is."""
+        """Raise `ConfigError` with all of `wrong`, if there are any."""
         if self.wrong:
             raise ConfigError.collected(self.wrong)
 
     @property
     def messages(self) -> tuple[Message, ...]:
-        """All, what is wrong first."""
+        """All messages, `wrong` first."""
         return (*self.wrong, *self.doubtful)
 
     def _place(self, line: int) -> Place:
@@ -101,29 +103,32 @@ class Remarks:
 
 
 def check_all(remarks: Iterable[Remarks]) -> None:
-    """Raise `ConfigError` for the first file in which anything is wrong."""
+    """Raise `ConfigError` for the first file with a fault."""
     for each in remarks:
         each.check()
 
 
 def messages_of(remarks: Iterable[Remarks]) -> tuple[Message, ...]:
-    """All of several files."""
+    """All messages on several files."""
     return tuple(message for each in remarks for message in each.messages)
 
 
 def _rows(text: str) -> list[str]:
-    """The lines, whether they end in LF, CR LF or CR."""
+    """The lines of a text with line ends LF, CR LF or CR."""
     rows = re.split("\r\n|\n|\r", text)
     return rows if rows[-1] else rows[:-1]
 
 
 def unit_of(letter: str) -> float:
-    """mm or rad per unit of a file."""
+    """mm or rad per unit of a file (mm or degree), by the axis letter."""
     return DEGREE if letter in TURNING else 1.0
 
 
 def in_order(machine: Machine, known: Sequence[str] = ORDER) -> tuple[str, ...]:
-    """The axes of a machine as its control counts them; raises `RefusedError` NCF484 for one that it cannot have."""
+    """The axes of a machine in the order of its control; raises `RefusedError` NCF484 for an impossible axis.
+
+    known  axis letters of the control, in its order
+    """
     odd = [axis.name for axis in machine.axes if axis.name not in {*known} or (axis.name in TURNING) != axis.rotary]
     if odd:
         lengths = " ".join(letter for letter in known if letter not in TURNING)

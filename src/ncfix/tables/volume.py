@@ -1,9 +1,9 @@
-"""Grids over several axes: the exact correction at every node, or what comes nearest to it all around.
+"""Grids over several axes, and the search for the number of nodes along each axis.
 
-`search` finds how many nodes along each axis a grid takes. A grid that is linear between nodes misses about the sum of
-what it misses along each axis alone, and that is quickly looked up on random lines. So for every number of nodes in all
-the best way to share them out among the axes is known beforehand; the fewest that really are within the target are then
-looked for among those.
+A grid holds the exact correction at every node, or the values that fit it best all around. `search` finds the number of
+nodes along each axis. A multilinear grid misses about the sum of what it misses along each axis alone, which is quickly
+computed on random lines. So for every total number of nodes the best distribution among the axes is known; among these
+distributions the search finds the smallest one that really meets the target.
 """
 
 from __future__ import annotations
@@ -20,63 +20,61 @@ from ncfix.tables.grid import WITHIN, Bending, Grid, between, fitted, on_full_gr
 from ncfix.values import frozen, mutable
 
 LINES = 32
-"""Random lines along an axis on which its bending is judged."""
+"""Number of random lines along an axis on which the error of its nodes is evaluated."""
 CHECKS = 8000
-"""Random poses on which a grid is judged, four times as many as in Esmaeili (2021), section 4.2."""
+"""Number of random poses at which a grid is checked, four times as many as in Esmaeili (2021), section 4.2."""
 MATTERS = 1e-6
-"""mm: a smaller change of the correction is none."""
+"""Smallest change of the correction that counts, mm."""
 DIGITS = 6
 """Decimals of a node's position, mm or degree."""
 STEP = 1e-3
-"""Of nodes with an anchor, what steps are whole multiples of: mm or degree, what parameters of controls can say."""
+"""Unit of the step of nodes with an anchor, mm or degree, as in parameters of controls."""
 SLACK = 1e-6
-"""Of that, what rounding may come to."""
+"""Rounding tolerance of a step, in that unit."""
 END = 1e-9
-"""An anchor that is no farther from an end of the range is there."""
+"""Distance from an end of the range, mm or degree, within which an anchor is at the end."""
 COARSE = (3, 5, 9, 17)
-"""Nodes an axis of the grid on which the middle over other axes is looked up."""
+"""Numbers of nodes per axis that are tried for the grid of the middle over other axes."""
 SEEN = 200
-"""Random positions at which it is seen whether they are enough."""
+"""Number of random positions at which that grid is checked."""
 NEARLY = 1e-4
-"""mm: what they may miss; the middle is exact nowhere."""
+"""Largest error of that grid, mm."""
 OTHERS = 12
-"""Poses of other axes, besides the corners of their ranges, over which a middle is taken."""
+"""Number of poses of other axes, besides the corners, over which the middle is taken."""
 CLOSE = 48
-"""Up to here every count of even nodes is looked at, since they may come to lie on the kinks of a table; then some."""
-FAR = 130
+"""Up to this number every number of even nodes is tried, since they may hit the kinks of a table."""
+MAX_NODES = 130
 GROWTH = 1.15
-"""Most nodes that are looked at, and by which factor their count grows to there."""
+"""Largest number of even nodes that is tried, and the factor of growth from `CLOSE` on."""
 FINE = 1 / 8
-"""Share of the target from which an axis alone is good enough."""
+"""Share of the target at which one axis has enough nodes."""
 SURELY = 1 / 2
-"""Of the target: a grid that misses less along all its axes together is good enough."""
+"""Share of the target within which the sum of the errors of all axes is surely good enough."""
 AIM = 0.95
-"""Share of a target that is aimed at: poses that were not looked at may miss a little more than those that were."""
+"""Share of a target that is aimed at, since poses that were not checked may be slightly worse."""
 LAST = 3
-"""Of the largest grids, how many are tried."""
+"""Number of the largest grids that are tried if the target is missed."""
 REMEMBERED = 1 << 16
-"""Grids with more points than this are not kept for when they are asked for again."""
+"""Largest number of points of a grid that is cached."""
 
 
 @mutable
 class Volume:
-    """Corrections of some axes over the positions of some, of which grids are made and judged.
+    """Corrections of some axes as a function of the positions of some axes, from which grids are made and checked.
 
     inputs   the axes that are looked up
-    ranges   (n_inputs, 2) where, mm and rad
+    ranges   (n_inputs, 2) ranges of their positions, mm and rad
     units    mm or rad per unit of their positions in a file
     outputs  the axes that are corrected
-    exact    their corrections at positions of the inputs: (n, n_inputs) -> (n, n_outputs) mm
-    area     values at nodes are those that come nearest to the corrections all around (least squares), not those of the
-             nodes themselves
-    written  what a file makes of a grid, which is judged after that: as it is where the file keeps every digit
-    made     what a file makes of the grid with so many nodes along each input, where that does not follow from the
-             corrections at its nodes alone
-    kinks    of each input, positions at which the corrections may have a corner
-    uneven   nodes need not be evenly spaced
-    covered  (n_inputs, 2) where nodes are, mm and rad; beyond, but within the ranges, the values at the ends hold
-    anchors  of each input, a position within its range at which there must be a node, in its unit of the file, or None.
-             Steps are then whole thousandths of that unit, and the outermost nodes may lie beyond the range
+    exact    positions of the inputs (n, n_inputs) -> corrections (n, n_outputs), mm
+    area     whether values at nodes are fitted to the surroundings (least squares) instead of exact at the nodes
+    written  grid -> the grid after rounding by the file, which is what is checked
+    made     numbers of nodes -> the grid of a file, if that does not follow from the corrections at its nodes
+    kinks    for each input, positions at which the corrections may have a corner
+    uneven   whether nodes may be unevenly spaced
+    covered  (n_inputs, 2) range of the nodes, mm and rad; beyond it, within `ranges`, the end values hold
+    anchors  for each input, a position within its range that must be a node, in the unit of the file, or None. Steps
+             are then whole thousandths of that unit, and the outermost nodes may lie beyond the range
     """
 
     inputs: tuple[str, ...]
@@ -103,7 +101,7 @@ class Volume:
     def of(
         cls, machine: Machine, inputs: tuple[str, ...], space: Array, tool_length: float, area: bool = False
     ) -> Volume:
-        """X, Y and Z of a machine over some axes; the others stay at zero, or as near as they can."""
+        """Corrections of X, Y and Z of a machine over some axes; the others are at zero, or nearest to it."""
         columns = [machine.axis_names.index(name) for name in inputs]
         linear = linear_axes(machine)
         rest = np.clip(np.zeros(len(space)), space[:, 0], space[:, 1])
@@ -122,10 +120,10 @@ class Volume:
     def over_all(
         cls, machine: Machine, inputs: tuple[str, ...], space: Array, tool_length: float, area: bool = False
     ) -> Volume:
-        """As `of`, in the middle of what is asked for over the whole range of the other axes.
+        """As `of`, but with the middle of the corrections over the whole ranges of the other axes.
 
-        What other positions of the other axes add to a correction is levers and turns, which change slowly with where
-        the inputs stand: it is worked out on a coarse grid of them, as fine as it takes, and straight in between.
+        The difference from the correction with the other axes at rest comes from levers and rotations and changes
+        slowly with the inputs, so it is interpolated on a coarse grid.
         """
         found = cls.of(machine, inputs, space, tool_length, area)
         columns = [machine.axis_names.index(name) for name in inputs]
@@ -135,7 +133,7 @@ class Volume:
         rest = np.unique(rest, axis=0)
 
         def added(positions: Array) -> Array:
-            """The middle less the correction with the other axes at rest."""
+            """Middle of the corrections minus the correction with the other axes at rest, (n, 3) mm."""
             meant = found.exact(positions)
             low = high = meant
             for place in rest:
@@ -155,7 +153,7 @@ class Volume:
         return replace(found, exact=lambda positions: found.exact(positions) + grid.at(positions))
 
     def grid(self, counts: Sequence[int]) -> Grid:
-        """The table with that many nodes along each input, at positions that files can say."""
+        """The table with these numbers of nodes along the inputs, at positions that a file can hold; cached."""
         key = tuple(counts)
         if key in self._grids:
             return self._grids[key]
@@ -172,7 +170,7 @@ class Volume:
         return Grid(self.inputs, nodes, self.outputs, fitted(values, looked_at, nodes) if self.area else values)
 
     def _at(self, places: Array) -> Array:
-        """The corrections at places (n, n_inputs); beyond the ranges they go on as straight as they came there."""
+        """The corrections at places (n, n_inputs); beyond the ranges extrapolated by point reflection at the edge."""
         if not self.anchors:
             return self.exact(places)
         low, high = self.ranges.T
@@ -185,7 +183,7 @@ class Volume:
         return values
 
     def _around(self, index: int, nodes: Array, within: int) -> Array:
-        """Places between the nodes, and where the ends hold: these count as much as half a cell."""
+        """Positions for the fit: between the nodes, and beyond the end nodes, which count as half a cell."""
         low, high = self.ranges[index].tolist()
         step = (nodes[-1] - nodes[0]) / (len(nodes) - 1) / within
         before = np.linspace(low, nodes[0], within // 2, endpoint=False) if nodes[0] - low > step else np.zeros(0)
@@ -193,7 +191,7 @@ class Volume:
         return np.concatenate([before, between(nodes, within), after[::-1]])
 
     def nodes(self, index: int, count: int) -> Array:
-        """The positions of so many nodes along one input, as files can say them."""
+        """Positions of `count` nodes along one input, mm or rad, rounded as in a file."""
         if self.uneven:
             line = self._bends(index).uneven()[count][0] / self.units[index]
         else:
@@ -202,11 +200,11 @@ class Volume:
         return np.round(line, DIGITS) * self.units[index]
 
     def anchor(self, index: int) -> float | None:
-        """The position at which one input must have a node, in its unit of the file."""
+        """The position at which one input must have a node, in the unit of the file; None if there is none."""
         return self.anchors[index] if self.anchors else None
 
     def least(self, index: int) -> int:
-        """The fewest nodes along one input: a node at its anchor that is not at an end makes them three."""
+        """Smallest number of nodes along one input: 2, or 3 with an anchor that is not at an end."""
         anchor = self.anchor(index)
         return 2 if anchor is None or np.abs(self.covered[index] / self.units[index] - anchor).min() < END else 3
 
@@ -219,25 +217,25 @@ class Volume:
         return float(np.linalg.norm(self.written(grid).at(positions) - exact, axis=1).max())
 
     def counts(self, index: int, most: int) -> list[int]:
-        """How many nodes may be put along one input."""
+        """The numbers of nodes along one input that are tried, ascending, at most `most`."""
         if self.uneven:
             return sorted(count for count in self._bends(index).uneven() if count <= most)
         found = [self.least(index)]
-        while found[-1] < min(most, FAR):
+        while found[-1] < min(most, MAX_NODES):
             found.append(found[-1] + 1 if found[-1] < CLOSE else int(np.ceil(found[-1] * GROWTH)))
-        return [count for count in found if count <= min(most, FAR)]
+        return [count for count in found if count <= min(most, MAX_NODES)]
 
     def fewer(self, index: int, count: int) -> int:
-        """The next smaller number of nodes along one input."""
+        """The next smaller possible number of nodes along one input."""
         return max((each for each in self.counts(index, count - 1)), default=2) if self.uneven else count - 1
 
     def bending(self, index: int, count: int) -> float:
-        """The largest correction that `count` nodes along one input miss on random lines along it, mm."""
+        """Largest correction that `count` nodes along one input miss on random lines, mm."""
         bends = self._bends(index)
         return bends.uneven()[count][1] if self.uneven else bends.missed(self.nodes(index, count))
 
     def trimmed(self, index: int, allowed: float) -> Volume:
-        """Nodes of one input only where the corrections change: at either end by no more than is allowed, mm."""
+        """The volume with nodes of one input only where the corrections change by more than `allowed`, mm."""
         covered = self.covered.copy()
         covered[index] = self._bends(index).ends(allowed)
         anchor = self.anchor(index)
@@ -262,7 +260,7 @@ class Volume:
 
 
 def even_line(low: float, high: float, count: int, anchor: float | None) -> Array:
-    """Evenly spaced nodes from one end to the other, or as near to that as they can be with one at the anchor."""
+    """`count` evenly spaced nodes over a range; with an anchor, one of them is there and the ends may be exceeded."""
     if anchor is None:
         return np.linspace(low, high, count)
     before = np.arange(count)
@@ -278,7 +276,7 @@ def even_line(low: float, high: float, count: int, anchor: float | None) -> Arra
 
 
 def inputs_that_matter(machine: Machine, space: Array, tool_length: float) -> tuple[str, ...]:
-    """The linear axes that take up the errors, and those others on which the correction depends."""
+    """The linear axes that correct the tip, and the other axes on which the correction depends."""
     q, other = random_poses(space, 200, seed=13), random_poses(space, 200, seed=17)
     state = State(tool_length)
     before = exact_correction(machine, q, state)
@@ -293,13 +291,13 @@ def inputs_that_matter(machine: Machine, space: Array, tool_length: float) -> tu
 
 
 def unseen_axes(machine: Machine, space: Array, tool_length: float, inputs: Sequence[str]) -> str:
-    """The axes on which the correction depends and a table over `inputs` does not, in words; empty: there are none."""
+    """Axes on which the correction depends but a table over `inputs` does not, as text; "" if there are none."""
     return ", ".join(name for name in inputs_that_matter(machine, space, tool_length) if name not in inputs)
 
 
 @frozen
 class Mesh:
-    """A grid that was searched for.
+    """The result of a search.
 
     grid     the table
     left     largest correction that it misses at random poses, mm
@@ -312,10 +310,10 @@ class Mesh:
 
 
 def search(volume: Volume, target: float, most: Sequence[int], points: int, equal: bool = False) -> Mesh:
-    """The grid with the fewest nodes found that misses at most `target` (mm) of the correction anywhere.
+    """The grid with the fewest nodes found that misses at most `target`, mm.
 
-    At most `most` nodes along each input and `points` in all. `equal` adds one along every input at a time, from two
-    on, as Esmaeili (2021), Fig. 4.4.
+    most    largest number of nodes along each input; points: in all
+    equal   the same number of nodes along every input, increased one by one, as Esmaeili (2021), Fig. 4.4
     """
     if equal:
         side = int(min(min(most), np.floor(points ** (1 / len(most)) + 1e-9)))
@@ -328,7 +326,7 @@ def search(volume: Volume, target: float, most: Sequence[int], points: int, equa
 
 
 def _along(volume: Volume, axis: int, target: float, most: int) -> tuple[Index, Array]:
-    """Numbers of nodes along one input, and what each misses there."""
+    """Numbers of nodes along one input, and what each misses along it, mm."""
     counts, missed = [], []
     for count in volume.counts(axis, most):
         counts.append(count)
@@ -339,9 +337,9 @@ def _along(volume: Volume, axis: int, target: float, most: int) -> tuple[Index, 
 
 
 def _frontier(axes: Sequence[tuple[Index, Array]], points: int) -> tuple[Index, Array]:
-    """The counts (k, n_inputs) of which none has more nodes and misses more than another, by their number of nodes.
+    """The Pareto-optimal counts (k, n_inputs) of total nodes and error, by ascending total; and their errors, mm.
 
-    And what each misses along all axes together.
+    The error of counts is the sum of the errors along all axes.
     """
     counts, missed = np.zeros((1, 0), dtype=np.intp), np.zeros(1)
     for index, (line, part) in enumerate(axes):
@@ -364,7 +362,7 @@ def _at(volume: Volume, counts: Index, target: float) -> Mesh:
 
 
 def _first(volume: Volume, target: float, ladder: Index) -> Mesh:
-    """The first of a ladder that is good enough, or the best of them."""
+    """The first counts of a ladder (k, n_inputs) that meet the target, or the best ones."""
     best = _at(volume, ladder[0], target)
     for counts in ladder[1:]:
         if best.reached:
@@ -374,10 +372,9 @@ def _first(volume: Volume, target: float, ladder: Index) -> Mesh:
 
 
 def _bisected(volume: Volume, target: float, ladder: Index, surely: bool) -> Mesh:
-    """The first of a ladder that is good enough, if they get better and better; or the best of the last few.
+    """The first counts of a ladder that meet the target, by bisection; or the best of the last few.
 
-    Those are looked at only if the last of all is not good enough, or none before it is. The last is the largest by
-    far: it is not looked at first where it is good enough `surely`.
+    surely  the last and largest grid certainly meets the target, so it need not be checked first
     """
     low, high, best = 0, len(ladder) - 1, None
     if not surely:
@@ -401,7 +398,7 @@ def _best_of_last(volume: Volume, target: float, ladder: Index, last: Mesh) -> M
 
 
 def _thinned(volume: Volume, mesh: Mesh, target: float) -> Mesh:
-    """Take nodes away as long as the target still holds."""
+    """Remove nodes along each axis as long as the target is still met."""
     counts = np.array(mesh.grid.counts, dtype=np.intp)
     for axis in np.argsort(counts):
         while counts[axis] > volume.least(int(axis)):
