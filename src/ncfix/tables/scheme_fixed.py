@@ -67,7 +67,7 @@ def _cubic(rotary: bool, constant: bool) -> Basis:
 
 @frozen
 class Piece:
-    """A table of a fixed form: basis functions of an axis, times a known function of another axis (`centre`), if any."""
+    """A table of a fixed form: basis functions of an axis, times a known function of another axis, `centre`, if any."""
 
     axis: int
     basis: Basis
