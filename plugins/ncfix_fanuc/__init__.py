@@ -1,4 +1,4 @@
-"""Fanuc and its like: the dialects `fanuc`, `haas`, `mitsubishi`, and Fanuc's three-dimensional error compensation."""
+"""Fanuc and similar controls: dialects `fanuc`, `haas`, `mitsubishi`, and Fanuc's three-dimensional compensation."""
 
 from __future__ import annotations
 
@@ -97,14 +97,14 @@ MITSUBISHI = replace(
 
 @hookimpl
 def register_dialects(register: Register[Dialect]) -> None:
-    """Bring the dialects."""
+    """Register the dialects."""
     for dialect in (FANUC, HAAS, MITSUBISHI):
         register(dialect)
 
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
-    """Bring the controls `fanuc` and `fanuc-rotary`, grids in space, and `fanuc-pitch`, stored pitch errors."""
+    """Register the controls `fanuc` and `fanuc-rotary`, grids in space, and `fanuc-pitch`, stored pitch errors."""
     register(made_by("ncfix_fanuc.control:Fanuc"), name="fanuc")
     register(made_by("ncfix_fanuc.rotary:FanucRotary"), name="fanuc-rotary")
     register(made_by("ncfix_fanuc.pitch:FanucPitch"), name="fanuc-pitch")

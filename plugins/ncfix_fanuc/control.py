@@ -1,9 +1,10 @@
 """Three-dimensional error compensation of Fanuc Series 30i: a grid of corrections over X, Y and Z.
 
-The interpolation (A-79351E, trilinear in the control's current position), the size (25 x 25 x 25) and the record of
-the FOCAS library are public; the control's own text file is not: one is written only if a template is given, and its
-name says that it is assumed. What would double the error if guessed wrongly must be said: `--set sign=...`. The grid is
-filled exactly, by least squares or in the middle of what all angles ask for, in whole numbers, play apart.
+The interpolation (A-79351E, trilinear in the control's current position), the size (25 x 25 x 25) and the record of the
+FOCAS library are public. The control's own text file is not: one is written only if a template is given, and its name
+says that it is assumed. The sign, which would double the error if guessed wrongly, must be given: `--set sign=...`. The
+grid is filled exactly, by least squares, or in the middle of the corrections of all angles of rotary axes; in whole
+numbers, with backlash compensated separately.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ ROTARY_NOTES = {
     "middle": "The grid lies in the middle of what all positions of {} ask for, and is exact at none.",
 }
 LEVEL = 0.1
-"""Of the target: where less changes towards an end of the travel, the edge of the grid may hold."""
+"""Share of the target: an end of the travel with a smaller change need not be covered, because the edge value holds."""
 
 
 class Fanuc(FileControl):
@@ -174,7 +175,7 @@ class Fanuc(FileControl):
     )
 
     def write(self, request: Request) -> Written:
-        """`volume.json` with the FOCAS records, the same as `volume.csv`, as text if asked for, and the play."""
+        """`volume.json` with the FOCAS records, the same as `volume.csv`, as text on request, and the backlash file."""
         made = GridFilling.of(request, self.settings(request.settings))
         volc, mesh = made.volc()
         files = {VOLUME_JSON: json_text(volc), VOLUME_CSV: csv_text(volc), **made.backlash.files()}
@@ -183,7 +184,7 @@ class Fanuc(FileControl):
         return Written(files, tuple(made.notes(volc, mesh)), made.least())
 
     def examined(self, files: Files) -> tuple[Compensation | None, list[Remarks]]:
-        """The grid, as the control would interpolate it, and play."""
+        """The grid, as the control would interpolate it, and the backlash compensation."""
         volc, remarks = read_volc(files)
         backlash, more = read_backlash(files, volc.style.home_minus if volc else "")
         if volc is None:
@@ -197,10 +198,12 @@ class Fanuc(FileControl):
 
 @frozen
 class GridFilling:
-    """What a grid is made of.
+    """The task of filling a grid.
 
-    sign  "correction" or "error"
-    unit  detection unit, mm
+    sign       "correction" or "error"
+    unit       detection unit, mm
+    fit        way to fill it: "nodes", "area" or "auto", see the option
+    rotary     angles of rotary axes: "zero" or "middle", see the option
     reference  machine coordinates of the reference position, mm
     """
 
@@ -226,7 +229,7 @@ class GridFilling:
         return cls(request, sign, unit, style, BacklashAmounts.of(request, settings, unit), fit, rotary, reference)
 
     def volc(self) -> tuple[Volc, Mesh]:
-        """The grid in whole numbers, and what it misses."""
+        """The grid in whole numbers, and the grid before rounding with its error."""
         mesh = self._searched()
         order = [mesh.grid.outputs.index(axis) for axis in LINEAR]
         values = mesh.grid.values[..., order]
@@ -241,7 +244,7 @@ class GridFilling:
         return Volc(self.sign, placing.first(step), step, self.unit, magnification, whole, self.style, placing), mesh
 
     def _searched(self) -> Mesh:
-        """Exact at its points if that will do, or fitted to what is around them, with points only where it bends."""
+        """The grid: exact at its points if that reaches the target, else fitted around them and trimmed at its ends."""
         first, *more = FITS[self.fit]
         found = [self._mesh(first, False)]
         if not found[0].reached:
@@ -264,24 +267,24 @@ class GridFilling:
         return replace(volume, exact=lambda places: exact(places) + shift, written=rounded, anchors=self.reference)
 
     def _rounded(self, grid: Grid) -> Grid:
-        """What whole numbers make of it."""
+        """The grid with its values rounded to whole numbers."""
         quantum = _magnification(grid.values, self.style.largest * self.unit) * self.unit
         return replace(grid, values=np.rint(grid.values / quantum) * quantum)
 
     def least(self) -> Least:
-        """What no grid over X, Y and Z could do better."""
+        """The least error that any grid over X, Y and Z could leave."""
         request, play = self.request, any(self.backlash.amounts)
         return least_of_functions(request.machine, request.space, request.tool_length, LINEAR, play)
 
     def _even(self, mesh: Mesh) -> Iterator[str]:
-        """Of a target that is not reached, why, if it is for want of points."""
+        """Sentences about axes whose number of points keeps the target from being reached."""
         covered = np.array([[line[0], line[-1]] for line in mesh.grid.nodes])
         for index, count in enumerate(mesh.grid.counts):
             if count == SIDE:
                 yield least_of_even_nodes(replace(self._volume(), covered=covered), index, SIDE).sentence
 
     def notes(self, volc: Volc, mesh: Mesh) -> Iterator[str]:
-        """What was made, and what is left."""
+        """Notes: the grid, and the error that is left."""
         request, style = self.request, self.style
         counts = " x ".join(map(str, mesh.grid.counts))
         missed = f"it misses {1e3 * mesh.left:.2f} um at most, rounding included"

@@ -1,6 +1,6 @@
-"""Values out of JSON as they must be: whole numbers are whole, numbers are finite, lists are as long as they should be.
+"""Checked values of JSON records: whole numbers, numbers within limits, lists of the right length.
 
-All raise ValueError with words for people, or KeyError for a key that is not there.
+All functions raise ValueError with a text for people, or KeyError for a missing key.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 FAR = 1e6
-"""mm or degree: beyond any machine."""
+"""Largest position, mm or degree: beyond any machine."""
 
 
 def whole(record: Mapping[str, Any], key: str, low: int, high: int) -> int:
@@ -30,7 +30,7 @@ def real(record: Mapping[str, Any], key: str, low: float = -FAR, high: float = F
 
 
 def reals(record: Mapping[str, Any], key: str, count: int, low: float = -FAR) -> tuple[float, ...]:
-    """So many numbers."""
+    """A list of `count` numbers, not below `low`."""
     values = record[key]
     if not isinstance(values, list) or len(values) != count:
         raise ValueError(f"{key} is {values!r}, not {count} numbers")
@@ -38,7 +38,7 @@ def reals(record: Mapping[str, Any], key: str, count: int, low: float = -FAR) ->
 
 
 def wholes(record: Mapping[str, Any], key: str) -> list[int]:
-    """Whole numbers, however many."""
+    """A list of whole numbers of any length."""
     values = record[key]
     if not isinstance(values, list) or any(type(value) is not int or abs(value) > FAR for value in values):
         raise ValueError(f"{key} holds something that is not a whole number")
@@ -46,7 +46,7 @@ def wholes(record: Mapping[str, Any], key: str) -> list[int]:
 
 
 def text(record: Mapping[str, Any], key: str) -> str:
-    """A word."""
+    """A text."""
     value = record[key]
     if not isinstance(value, str):
         raise ValueError(f"{key} is {value!r}, not a word")
@@ -63,4 +63,4 @@ def records(value: Any) -> list[Mapping[str, Any]]:
 
 
 SMALLEST = math.ulp(1.0)
-"""Above zero."""
+"""Lower limit of a positive number."""

@@ -1,14 +1,14 @@
-"""What the parameters of Fanuc controls say, for all of their compensations: signs and units, places of grids, play.
+"""Parameters of Fanuc controls for all of their compensations: signs and units, positions of grids, backlash.
 
 Parameters are punched as by Series 15i and later (B-63330EN): records `N03620A1P33A2P...;` between two lines with `%`.
 
-Where the control puts a grid: its parameters say how many points there are along each axis, how far apart they are,
-and which of them lies at the reference position. So there must be a point there, and its number goes with the files.
+Position of a grid: parameters give the number of points along each axis, their interval, and the number of the point at
+the reference position. So there must be a point there, and its number goes with the files.
 
-Play is backlash compensation, parameter 1851: what is added to an axis whenever it turns round. The parameter manuals
-(B-63090EN, B-64120EN and later) say it: detection units, -9999 to 9999; moved against the direction of its reference
-position return, an axis is moved by the amount as well, in the direction of that motion. Moved in the direction of the
-return it is not, so that the mean of both ways is off by half of the amount, which goes into the grid.
+Backlash compensation, parameter 1851, is the amount that is added to an axis when it reverses. By the parameter manuals
+(B-63090EN, B-64120EN and later) it is in detection units, -9999 to 9999. An axis that moves against the direction of
+its reference position return is moved by the amount in addition, in the direction of motion. In the direction of the
+return nothing is added, so the mean of both directions is off by half of the amount, which goes into the grid.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ ENTRY = re.compile(r"([ASL])(\d+)[PM]([-+]?\d+\.?\d*)")
 PLACE = re.compile(r"([XYZABCUVW])=?([+-]?(?:\d+\.?\d*|\.\d+))")
 REFERENCE, POINTS, FIRST = "reference", "reference_points", "first"
 CLOSE = 1e-6
-"""mm or degree: positions nearer to each other are one."""
+"""Distance, mm or degree, below which two positions are the same."""
 PLACING_STEP = (
     "For each axis set the number of points, the interval, and the number of the point at the reference position as "
     "the remarks below list them: the control puts the grid by these, not by the positions in the files."
@@ -77,23 +77,23 @@ BACKLASH_STEP = (
 
 
 def sign_option(settled: str) -> Option:
-    """The option `sign`, with the assumption that it is about."""
+    """The option `sign`; `settled`: the assumption that it decides."""
     return Option(None, SIGNED, one_of(*SIGNS), settled)
 
 
 def sense_of(sign: str) -> int:
-    """1 if values are added, -1 if they are taken off."""
+    """1 if values are added to the command ("correction"), -1 if they are subtracted ("error")."""
     return 1 if sign == SIGNS[0] else -1
 
 
 def units_of(settings: Mapping[str, str]) -> tuple[float, float]:
-    """Detection units, mm and rad."""
+    """The detection units of linear axes, mm, and of rotary axes, rad."""
     length, angle = (float(settings[key]) for key in UNITS)
     return length / 1000, angle * DEGREE
 
 
 def is_records(content: bytes) -> bool:
-    """Whether a file is of records as parameters are punched; the lines with % around them may have been lost."""
+    """Whether a file has records of punched parameters; the lines with % around them may be missing."""
     rows = ("".join(row.split()).upper() for row in content.decode("latin-1").splitlines())
     first = next((row for row in rows if row.strip("%")), "")
     return bool(RECORD.fullmatch(first) or PLAIN.fullmatch(first))
@@ -149,7 +149,7 @@ def read_records(remarks: Remarks) -> tuple[PunchedParameter, ...]:
 
 
 def entries_of(text: str) -> list[tuple[str, float]] | None:
-    """Letters and positions; None for text that says anything else, or something twice."""
+    """The axis letters and positions of a text like X0,Y-5; None for any other text, or a repeated letter."""
     found = [PLACE.fullmatch(part) for part in re.split(r"[ ,]+", text.strip().upper()) if part]
     pairs = [(match[1], float(match[2])) for match in found if match is not None]
     return pairs if len(pairs) == len(found) == len({letter for letter, _ in pairs}) else None
@@ -159,7 +159,7 @@ REFERENCE_FORM = SettingForm("axes with their positions, like X0,Y0,Z-10.5", lam
 
 
 def placing_assumption(name: str) -> Assumption:
-    """What is taken for true of the place of a grid, under this id."""
+    """The assumption about the position of a grid, with id `name`."""
     return Assumption(
         name,
         "Points are an interval apart, numbered from 1 towards plus along each axis, and a parameter for each axis "
@@ -185,7 +185,7 @@ PLACING_OPTIONS: Mapping[str, Option] = {
 
 
 def references(request: Request, settings: Mapping[str, str]) -> dict[str, float]:
-    """The reference positions that the setting names, mm or degree.
+    """Letter -> reference position of the axes that the setting names, mm or degree.
 
     Raises `UsageError` NCF485 for an axis that the machine lacks.
     """
@@ -200,7 +200,7 @@ def references(request: Request, settings: Mapping[str, str]) -> dict[str, float
 def anchors(request: Request, settings: Mapping[str, str], inputs: Sequence[str]) -> tuple[float, ...]:
     """The reference position along each axis of a grid, mm or degree.
 
-    Raises `UsageError` NCF485 where it is not in the range of the grid, or said of an axis that the machine lacks.
+    Raises `UsageError` NCF485 if it is outside the range of the grid, or given for an axis that the machine lacks.
     """
     machine, given = request.machine, references(request, settings)
     for name in inputs:
@@ -221,10 +221,10 @@ def anchors(request: Request, settings: Mapping[str, str], inputs: Sequence[str]
 
 @frozen
 class Placing:
-    """A grid as the control's parameters put it, each along its axes.
+    """The position of a grid by the parameters of the control, for each axis.
 
-    reference  machine coordinates of the reference position, mm or degree
-    points     number of the point that lies there, from 1
+    reference  machine coordinate of the reference position, mm or degree
+    points     number of the point at the reference position, from 1
     """
 
     reference: tuple[float, ...]
@@ -239,23 +239,23 @@ class Placing:
         return cls(tuple(float(at) for at in reference), tuple(number + 1 for number in numbers))
 
     def first(self, step: Sequence[float]) -> tuple[float, ...]:
-        """Where the first points lie."""
+        """The position of the first point along each axis, mm or degree."""
         return tuple(
             round(at - (number - 1) * each, 6)
             for at, number, each in zip(self.reference, self.points, step, strict=True)
         )
 
     def entries(self, unit: str) -> dict[str, Any]:
-        """As they stand in a file; unit: mm or deg."""
+        """The entries of a file; `unit`: "mm" or "deg"."""
         return {f"{REFERENCE}_{unit}": self.reference, POINTS: self.points}
 
     def number(self, counts: Sequence[int], fastest: Sequence[int], first: int = 1) -> int:
-        """The number that the point at the reference position has among all; fastest: the axes, fastest first."""
+        """The number, among all points, of the one at the reference position; `fastest`: the axes, fastest first."""
         strides = {axis: math.prod(counts[each] for each in fastest[:place]) for place, axis in enumerate(fastest)}
         return first + sum((self.points[axis] - 1) * stride for axis, stride in strides.items())
 
     def notes(self, inputs: Sequence[str], counts: Sequence[int], step: Sequence[float], unit: str) -> Iterator[str]:
-        """What the parameters of each axis must be, in words."""
+        """The required parameters of each axis, in words."""
         rows = zip(inputs, counts, step, self.reference, self.points, self.first(step), strict=True)
         for name, count, each, at, point, first in rows:
             place = f"the reference position {name}{at:g} is point {point} (so the first is at {name}{first:g})"
@@ -265,7 +265,7 @@ class Placing:
 def placed(
     record: Mapping[str, Any], unit: str, step: Sequence[float], counts: Sequence[int], remarks: Remarks
 ) -> tuple[tuple[float, ...], Placing | None]:
-    """Where the first points of a grid lie by its parameters, and these; None in old files, which say that alone."""
+    """The first position along each axis of a grid by its parameters, and its `Placing`; None for old files without."""
     said = json_values.reals(record, f"{FIRST}_{unit}", len(step))
     if POINTS not in record:
         text = f"does not say which point lies at the reference position: the control cannot put the grid ({POINTS})"
@@ -286,14 +286,17 @@ def placed(
 
 @frozen
 class BacklashAmounts:
-    """Amounts of X, Y and Z in detection units, and the axes that go home towards minus."""
+    """Backlash compensation of X, Y and Z, in detection units.
+
+    home_minus  the axes whose reference position return goes towards minus
+    """
 
     amounts: tuple[int, ...] = (0, 0, 0)
     home_minus: str = ""
 
     @classmethod
     def of(cls, request: Request, settings: Mapping[str, str], unit: float) -> BacklashAmounts:
-        """The play of a machine, as it is written; unit: detection unit, mm. Raises `RefusedError` NCF484."""
+        """The backlash of a machine, rounded; `unit`: detection unit, mm. Raises `RefusedError` NCF484."""
         home = "".join(sorted(settings["home_minus"].upper()))
         if settings["play"] == "no":
             return cls(home_minus=home)
@@ -308,7 +311,7 @@ class BacklashAmounts:
         return cls(tuple(found.get(axis, 0) for axis in LINEAR), home)
 
     def files(self) -> dict[str, bytes]:
-        """The parameter as it is punched; no file if there is no play."""
+        """The file with the punched parameter; no file without backlash."""
         return (
             {BACKLASH_FILE: parameter_text({BACKLASH_PARAMETER: found})}
             if (found := {n: float(each) for n, each in enumerate(self.amounts, 1) if each})
@@ -316,12 +319,12 @@ class BacklashAmounts:
         )
 
     def shift(self, unit: float) -> Array:
-        """What grids must hold besides the mean of both ways, X, Y and Z, mm."""
+        """(3,) the part of X, Y and Z that grids must hold in addition to the mean of both directions, mm."""
         signs = [-1.0 if axis in self.home_minus else 1.0 for axis in LINEAR]
         return np.array(self.amounts) * signs * unit / 2
 
     def tables(self, unit: float) -> Compensation:
-        """What the control does: the amount, in the direction of motion, against that of the return."""
+        """The effect on the control: the amount is added when an axis moves against the direction of its return."""
         terms = []
         for axis, amount in zip(LINEAR, self.amounts, strict=True):
             way = 1 if axis in self.home_minus else -1
@@ -331,7 +334,7 @@ class BacklashAmounts:
         return Compensation(tuple(terms))
 
     def notes(self, unit: float) -> Iterator[str]:
-        """What was written, in words."""
+        """Notes on the backlash that was written."""
         for axis, amount in zip(LINEAR, self.amounts, strict=True):
             if amount:
                 yield f"Play of {axis}, {1e3 * amount * unit:+.2f} um, is in {BACKLASH_FILE}: {amount} detection units."

@@ -1,7 +1,7 @@
 """Stored pitch error compensation of Fanuc controls: increments of one axis over itself.
 
-The values are small whole numbers, each what is added on the way from one point to the next. They are rounded so that
-their sum is never off by more than half a step: the rounding error is carried along, not thrown away at every point.
+The values are small whole numbers, the changes of the correction from one point to the next. They are rounded so that
+their sum is never off by more than half a step: the rounding error is carried from point to point.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ from ncfix_fanuc.pitch_files import (
 )
 
 MOST_NUMBER = 9999
-"""Of a point: beyond any control's."""
+"""Largest number of a point, beyond that of any control."""
 THOUSANDTHS = 360_000
-"""Of a degree in a turn."""
+"""Number of thousandths of a degree in a turn."""
 
 
 class FanucPitch(FileControl):
@@ -120,7 +120,7 @@ class FanucPitch(FileControl):
     switch_off = "Set the magnification (3623) to 0."
 
     def write(self, request: Request) -> Written:
-        """The increments of every axis that has something to correct, and the parameters."""
+        """The increments of every axis that needs a correction, and the parameters."""
         settings = self.settings(request.settings)
         sense, units = sense_of(settings["sign"]), units_of(settings)
         axes, turning = in_order(request.machine), {axis.name for axis in request.machine.axes if axis.rotary}
@@ -157,7 +157,7 @@ class FanucPitch(FileControl):
         return is_increments(content) or is_records(content)
 
     def look(self, files: Files) -> tuple[Message, ...]:
-        """See `Control`; without what ncfix writes of sign and units, every file by itself."""
+        """See `Control`; without the settings file of ncfix, every file is checked on its own."""
         if SETTINGS in files:
             return self.lint(files)
         found = []
@@ -178,7 +178,7 @@ def _said(pitch: Pitch, units: tuple[float, float]) -> str:
 
 
 def _unsaid(axis: str, correction: float) -> str:
-    """Why an axis that errs has no points."""
+    """The note why an axis with errors gets no points."""
     rotary = axis in TURNING
     size = f"{correction / DEGREE:.4g} degree" if rotary else f"{1000 * correction:.1f} um"
     return (
@@ -188,7 +188,7 @@ def _unsaid(axis: str, correction: float) -> str:
 
 
 def _parameters(pitches: list[Pitch], axes: tuple[str, ...]) -> dict[int, dict[int, float]]:
-    """By number, and number of the axis; only of axes that have points."""
+    """Parameter number -> number of an axis -> value, for axes that have points."""
     rows: dict[int, dict[int, float]] = {number: {} for number in NUMBERS.values()}
     for each in pitches:
         values = (each.reference, each.first, each.last, each.magnification, each.interval, each.turn)
@@ -198,7 +198,7 @@ def _parameters(pitches: list[Pitch], axes: tuple[str, ...]) -> dict[int, dict[i
 
 
 def curves(request: Request) -> dict[str, tuple[Grid, ...]]:
-    """The forward and the reverse correction of each axis over itself."""
+    """Letter -> corrections of the axis over itself: forward and, if it differs, reverse."""
     tables = positioning(request.machine, request.space, request.tool_length, MOST_POINTS - 1, request.target)
     found: dict[str, tuple[Grid, ...]] = {}
     for term in tables.terms:
@@ -207,7 +207,7 @@ def curves(request: Request) -> dict[str, tuple[Grid, ...]]:
 
 
 def at_reference(tables: tuple[Grid, ...], at: float) -> float:
-    """The correction at the reference position (mm or degree), mm or rad: what increments cannot say."""
+    """The correction at the reference position `at` (mm or degree), mm or rad, which increments cannot represent."""
     place = np.array([[at * unit_of(tables[0].inputs[0])]])
     return float(np.mean([table.at(place)[0, 0] for table in tables]))
 
@@ -215,10 +215,10 @@ def at_reference(tables: tuple[Grid, ...], at: float) -> float:
 def pitch_of(
     request: Request, axis: str, tables: tuple[Grid, ...], step: float, number: int, at: float
 ) -> Pitch | None:
-    """The increments of an axis; twice as many points as the curve needs, and twice again, while that rounds less.
+    """The increments of an axis; the number of points is doubled while that lowers the magnification.
 
-    step    what a detection unit adds to a correction, mm or rad: below zero where increments are errors
-    number  the first point that is free
+    step    change of the correction by a detection unit, mm or rad; negative if increments are errors
+    number  the first free point number
     at      the reference position, mm or degree
     """
     if not tables:
@@ -234,12 +234,12 @@ def pitch_of(
 def _with_cells(
     request: Request, axis: str, tables: tuple[Grid, ...], step: float, number: int, cells: int, at: float
 ) -> Pitch | None:
-    """The increments with about so many intervals, if they make the axis better: that at the reference is not said.
+    """The increments with about `cells` intervals; None if they do not make the axis better.
 
-    Points are numbered so that the reference position has a number of zero or more, wherever it lies. The first and the
-    last point of a turn are one place, and have the same value (B-63980EN, p. 100). A turn has a whole number of
-    intervals, which are whole thousandths of a degree: the control counts in them. An outermost point beyond the travel
-    has the value that makes the end of the travel right.
+    The correction at the reference position cannot be represented. Points are numbered so that the number of the
+    reference position is not negative. The first and the last point of a turn are the same place, and have the same
+    value (B-63980EN, p. 100). A turn has a whole number of intervals of whole thousandths of a degree, because the
+    control counts in these. An outermost point beyond the travel gets the value that makes the end of the travel right.
     """
     column = request.machine.axis_names.index(axis)
     described = request.machine.axes[column]
@@ -273,7 +273,7 @@ def _with_cells(
 
 
 def _ends(low: float, high: float, interval: float) -> tuple[int, int]:
-    """The first and last whole number of intervals from the reference position that hold a range."""
+    """The first and last whole number of intervals from the reference position that enclose a range."""
     first = math.floor(low / interval + 1e-9)
     return first, max(math.ceil(high / interval - 1e-9), first + 1)
 
@@ -281,7 +281,7 @@ def _ends(low: float, high: float, interval: float) -> tuple[int, int]:
 def diffused(curve: Array) -> tuple[Ints, int]:
     """Increments from -7 to 7 whose sums follow a curve (detection units) within half a step, and the magnification.
 
-    The first increment leads to the first point and is none: sums count from the reference position, where the curve
+    The first increment, which leads to the first point, is 0: sums count from the reference position, where the curve
     is zero.
     """
     magnification = 1

@@ -1,4 +1,4 @@
-"""Stored pitch errors as files: written, and read back as the control sums them up, with remarks on what does not fit.
+"""Files of stored pitch errors: written, and read back as the control sums them up, with remarks on faults.
 
 Increments are in the form of the sample of B-63980EN, p. 100: `no,value`; parameters 3620 to 3625 belong to them.
 """
@@ -21,29 +21,29 @@ from ncfix_fanuc.parameters import SIGNS, entries_of, read_records, sense_of
 
 LARGEST_INCREMENT = 7
 MOST_POINTS = 128
-"""Points of an axis."""
+"""Largest number of points of an axis."""
 NUMBERS = {"reference": 3620, "low": 3621, "high": 3622, "magnification": 3623, "interval": 3624, "turn": 3625}
 HEAD = "no,value"
 POINT = re.compile(r"\s*(\d{1,6})\s*[,;\s]\s*([-+]?\d{1,6})\s*")
 PARAMETERS, SETTINGS = "parameters.txt", "settings.txt"
 MOST_PITCH_MAGNIFICATION = 100
-"""The largest magnification of pitch errors (parameter 3623)."""
+"""Largest magnification of pitch errors (parameter 3623)."""
 FAR = 1e6
-"""mm or degree: no interval is that long."""
+"""Largest interval, mm or degree."""
 
 
 @frozen
 class Pitch:
     """The increments of one axis.
 
-    axis           its letter
+    axis           letter of the axis
     first          number of the first point
-    increments     (n,) times magnification times detection unit: what is added on the way from the point before; of a
-                   turn the first is the last one again
+    increments     (n,) change of the correction from the point before, in detection units times magnification; on an
+                   endless axis the first repeats the last
     reference      number of the point at the reference position
-    magnification  factor
-    interval       mm or degree
-    turn           travel of a turn, degree; 0 for an axis that does not turn round
+    magnification  factor of the detection unit
+    interval       distance of the points, mm or degree
+    turn           travel of one turn, degrees; 0 for an axis that is not endless
     at             machine coordinate of the reference position, mm or degree
     """
 
@@ -63,7 +63,7 @@ class Pitch:
 
 
 def pitch_text(pitch: Pitch) -> bytes:
-    """The increments."""
+    """The file of increments of an axis."""
     note = f"# No.{pitch.first}..{pitch.last}, incremental values (-7..+7), x magnification, detection units"
     rows = [f"{number},{value}" for number, value in enumerate(pitch.increments.tolist(), pitch.first)]
     return "".join(f"{row}\n" for row in [note, HEAD, *rows]).encode()

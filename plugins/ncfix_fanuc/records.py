@@ -1,7 +1,7 @@
-"""Grids as records of the FOCAS library (fwlib32.h), in JSON: whole numbers, and what the parameters must be.
+"""Grids as records of the FOCAS library (fwlib32.h), in JSON: whole numbers, and the required parameters.
 
-`Volc`, of `ODBVOLC`: 72 numbers, 24 points of three axes; the same as CSV, and as a text file by a template. `Lattice`,
-of `IODBROTVOLC`: three lengths and three angles at every point.
+`Volc`, after `ODBVOLC`: records of 72 numbers, for 24 points and three axes; also as CSV, and as a text file by a
+template. `Lattice`, after `IODBROTVOLC`: three lengths and three angles at every point.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from ncfix_fanuc.json_values import SMALLEST
 from ncfix_fanuc.parameters import LINEAR, SIGNS, Placing, placed, sense_of
 
 RECORD_POINTS = 24
-"""Of one record."""
+"""Number of points in a record."""
 SIDE = 25
-"""Along an axis."""
+"""Largest number of points along an axis."""
 MOST_GRID_MAGNIFICATION = 100
 MOST_NUMBER = 99_999_999
 TEMPLATE_FIELDS = ("no", "dx", "dy", "dz", "x", "y", "z")
 NUMBER_FORM = re.compile(r"[+0 -]?\d{0,2}(?:\.\d)?[dfg]?")
-"""How a number of a template may be written."""
+"""Permitted format of a number in a template."""
 VOLUME_JSON, VOLUME_CSV, VOLUME_TEXT = "volume.json", "volume.csv", "volume-ASSUMED.txt"
 MOST_LATTICE_MAGNIFICATION = 10_000
 MOST_ROTARY = 400
@@ -43,12 +43,12 @@ ANGLES = ("A", "B", "C")
 
 @frozen
 class PointNumbering:
-    """What no public text says of the numbering and the text file.
+    """The numbering of points and the form of the text file, which are not documented publicly.
 
-    first     number of the first point
-    order     the axes from the one whose number runs fastest
-    largest   value of a point
-    template  a line of the text file; "" for none
+    first       number of the first point
+    order       the axes, beginning with the one whose number runs fastest
+    largest     largest value of a point
+    template    line of the text file for a point; "" for no text file
     home_minus  the axes whose reference position return goes towards minus
     """
 
@@ -61,15 +61,15 @@ class PointNumbering:
 
 @frozen
 class Volc:
-    """A grid in whole numbers.
+    """A grid of whole numbers.
 
     sign           "correction" or "error"
     low, step      first node and interval of X, Y and Z, mm
     unit           detection unit, mm
-    magnification  values are in units times this
-    values         (nx, ny, nz, 3)
-    style          numbering and text
-    placing        how the parameters of the control put it; None in files that do not say it
+    magnification  factor of the unit; values are in units times this
+    values         (nx, ny, nz, 3) values along X, Y and Z
+    style          numbering and text file
+    placing        position of the grid by the parameters of the control; None for files without it
     """
 
     sign: str
@@ -83,22 +83,22 @@ class Volc:
 
     @property
     def axes(self) -> tuple[int, ...]:
-        """The axes of `values` from the slowest to the fastest number."""
+        """The axes of `values`, from the one whose number runs slowest to the fastest."""
         return tuple("XYZ".index(axis) for axis in reversed(self.style.order))
 
     @property
     def rows(self) -> Ints:
-        """By point number, (n, 3)."""
+        """(n, 3) values by point number."""
         return self.values.transpose(*self.axes, 3).reshape(-1, 3)
 
     @property
     def places(self) -> Array:
-        """The positions of the points by number, (n, 3) mm."""
+        """(n, 3) positions of the points by point number, mm."""
         points = full_grid(_nodes(self.low, self.step, self.values.shape)).reshape(self.values.shape)
         return points.transpose(*self.axes, 3).reshape(-1, 3)
 
     def grid(self) -> Grid:
-        """As corrections."""
+        """The grid as corrections, mm."""
         factor = self.unit * self.magnification * sense_of(self.sign)
         nodes = _nodes(self.low, self.step, self.values.shape)
         return Grid(LINEAR, nodes, LINEAR, self.values.astype(np.float64) * factor)
@@ -111,14 +111,14 @@ def _nodes(low: Sequence[float], step: Sequence[float], counts: Sequence[int]) -
 
 
 def _json(head: Mapping[str, Any], records: Iterable[str]) -> bytes:
-    """An object with a line for each entry and each record."""
+    """A JSON object with one line for each entry and each record."""
     lines = "".join(f' "{key}": {json.dumps(value)},\n' for key, value in head.items())
     body = ",\n".join(f"  {record}" for record in records)
     return f'{{\n{lines} "records": [\n{body}\n ]\n}}\n'.encode()
 
 
 def json_text(volc: Volc) -> bytes:
-    """The records with what the parameters must be."""
+    """The JSON file: the required parameters, and the records."""
     head = {
         "sign": volc.sign,
         "first_mm": volc.low,
@@ -143,7 +143,7 @@ def json_text(volc: Volc) -> bytes:
 
 
 def _placing(volc: Volc) -> dict[str, Any]:
-    """How the parameters put the grid, and the number of the point at the reference position among all."""
+    """The entries of the grid's position by parameters, with the number of the point at the reference position."""
     if volc.placing is None:
         return {}
     number = volc.placing.number(volc.values.shape[:3], volc.axes[::-1], volc.style.first)
@@ -151,7 +151,7 @@ def _placing(volc: Volc) -> dict[str, Any]:
 
 
 def csv_text(volc: Volc) -> bytes:
-    """One line a point: number, position, values."""
+    """The CSV file: one line for each point, with number, position and values."""
     lines = [
         f"{number},{x:.6f},{y:.6f},{z:.6f},{dx},{dy},{dz}\n" for number, ((x, y, z), (dx, dy, dz)) in _numbered(volc)
     ]
@@ -159,7 +159,7 @@ def csv_text(volc: Volc) -> bytes:
 
 
 def template_text(volc: Volc) -> bytes:
-    """The text file that the template makes: ASSUMED."""
+    """The text file by the template; its form is assumed."""
     lines = [
         volc.style.template.format(no=number, dx=dx, dy=dy, dz=dz, x=x, y=y, z=z)
         for number, ((x, y, z), (dx, dy, dz)) in _numbered(volc)
@@ -172,7 +172,7 @@ def _numbered(volc: Volc) -> Iterator[tuple[int, tuple[list[float], list[int]]]]
 
 
 def read_volc(files: Files) -> tuple[Volc | None, Remarks]:
-    """The grid of the records, with remarks on them and on whether the CSV says the same."""
+    """The grid of the records, and remarks on them, also if the CSV or text file differs."""
     remarks = Remarks.of(VOLUME_JSON, files.get(VOLUME_JSON, b""))
     try:
         volc = _volc(json.loads(files.get(VOLUME_JSON, b"")), remarks)
@@ -242,7 +242,7 @@ def _check_home(home_minus: str, remarks: Remarks) -> None:
 
 
 def check_template(template: str) -> None:
-    """Raise ValueError for a line that cannot be filled in, or says too little."""
+    """Raise ValueError for a template that cannot be filled in, or lacks a value."""
     names = [(name, form) for _, name, form, _ in Formatter().parse(template) if name is not None]
     for name, form in names:
         if name not in TEMPLATE_FIELDS or not NUMBER_FORM.fullmatch(form or ""):
@@ -264,11 +264,11 @@ def _data(record: Mapping[str, Any], first: int, remarks: Remarks) -> list[int]:
 
 @frozen
 class WholeNumberScale:
-    """What whole numbers stand for.
+    """The meaning of whole numbers.
 
     sign            "correction" or "error"
-    units           detection units, mm and rad
-    magnifications  of lengths and of angles
+    units           detection units of lengths, mm, and of angles, rad
+    magnifications  factors of the units for lengths and for angles
     """
 
     sign: str
@@ -277,30 +277,31 @@ class WholeNumberScale:
 
     @property
     def factors(self) -> tuple[float, float]:
-        """Correction in mm and in rad of a value of 1."""
+        """The correction of a value of 1: of a length, mm, and of an angle, rad."""
         sense = float(sense_of(self.sign))
         length, angle = (sense * unit * many for unit, many in zip(self.units, self.magnifications, strict=True))
         return length, angle
 
     @property
     def rounding(self) -> tuple[float, float]:
-        """The most that a length and an angle are off by, mm and rad."""
+        """Largest rounding error of a length, mm, and of an angle, rad."""
         length, angle = (abs(factor) / 2 for factor in self.factors)
         return length, angle
 
 
 @frozen
 class Lattice:
-    """Records over some axes.
+    """A lattice of lengths and angles over some axes, in whole numbers.
 
-    inputs   the axes, that whose number runs fastest first
-    low      first position of each, mm or degree
-    step     interval
-    lin      (*counts, 3) lengths along X, Y and Z
-    rot      (*counts, 3) angles about X, Y and Z
-    centre   mm: where angles turn about, if they turn a table
+    inputs      the axes, beginning with the one whose number runs fastest
+    low         first position along each axis, mm or degree
+    step        interval along each axis, mm or degree
+    scale       meaning of the numbers
+    lin         (*counts, 3) lengths along X, Y and Z
+    rot         (*counts, 3) angles about X, Y and Z
+    centre      point about which the angles turn a table, mm; () if they turn the tool
     home_minus  the linear axes whose reference position return goes towards minus
-    placing  how the parameters of the control put it; None in files that do not say it
+    placing     position of the lattice by the parameters of the control; None for files without it
     """
 
     inputs: tuple[str, ...]
@@ -322,9 +323,12 @@ class Lattice:
         reference: Sequence[float],
         centre: Array | None = None,
     ) -> Lattice:
-        """Corrections in whole numbers, with the smallest magnifications that hold them.
+        """Corrections (lengths, angles) as whole numbers, with the smallest magnifications that can hold them.
 
-        reference: where a node of each axis lies, mm or degree.
+        reference  reference position of each axis, at which a node lies, mm or degree
+        centre     (3,) point about which the angles turn a table, mm
+
+        Raises `RefusedError` NCF484 if a magnification would be too large.
         """
         factors, whole = [], []
         for grid, unit in zip(grids, units, strict=True):
@@ -350,7 +354,7 @@ class Lattice:
         return Grid(self.inputs, nodes, LINEAR, lin * length), Grid(self.inputs, nodes, ANGLES, rot * angle)
 
     def _placing(self) -> dict[str, Any]:
-        """How the parameters put it, and which record is that of the reference position."""
+        """The entries of the lattice's position by parameters, with the record at the reference position."""
         if self.placing is None:
             return {}
         counts = self.lin.shape[:-1]
@@ -358,7 +362,7 @@ class Lattice:
         return {**self.placing.entries("mm" if self.inputs == LINEAR else "deg"), "reference_number": number}
 
     def text(self) -> bytes:
-        """JSON: what the parameters must be, and a record for each point."""
+        """The JSON file: the required parameters, and a record for each point."""
         linear = self.inputs == LINEAR
         head = {
             "sign": self.scale.sign,
@@ -379,7 +383,7 @@ class Lattice:
 
 
 def read_lattice(name: str, content: bytes, linear: bool) -> tuple[Lattice | None, Remarks]:
-    """A file of records with remarks on it; no lattice if it cannot be used."""
+    """The lattice of a file, and remarks on the file; None if it cannot be used."""
     remarks = Remarks.of(name, content)
     try:
         return _checked(json.loads(content), remarks, linear), remarks

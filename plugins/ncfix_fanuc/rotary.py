@@ -1,14 +1,14 @@
 """Three-dimensional compensation with angles (`cnc_wrrotvolc`): three lengths and three angles at every point.
 
-The record, `IODBROTVOLC` of fwlib32.h, has `lin[3]` and `rot[3]`; what the control makes of them is not public. Taken
-for true, as in US patent 7969111, where lattice vectors of six components that depend on the linear axes and on the
-rotary axes are added up and move the linear axes: a lattice over X, Y and Z, whose lengths are what is added with a
-tool of no length and whose angles turn the tool about the gauge line, so that it holds for tools of any length; and a
-second lattice over the rotary axes of a table, whose angles turn the workpiece about the table's centre.
+The record, `IODBROTVOLC` of fwlib32.h, has `lin[3]` and `rot[3]`; their use by the control is not documented publicly.
+It is assumed to be as in US patent 7969111, where lattice vectors of six components, which depend on the linear and on
+the rotary axes, are added up and move the linear axes. There is a lattice over X, Y and Z: its lengths are the
+correction with a tool of length 0, and its angles turn the tool about the gauge line, so that it holds for tools of any
+length. A second lattice, over the rotary axes of a table, has angles that turn the workpiece about the table's centre.
 
-The first lattice holds the corrections with rotary axes at rest, the second what a table adds at other angles: its
-error at some angle shifts and turns the workpiece. What the linear axes have to follow is that shift, and the turn
-times the distance from where it is said to be about: six numbers for all positions of X, Y and Z.
+The first lattice holds the corrections with the rotary axes at rest, the second the change of the correction at other
+angles of the table. The error of a table at an angle shifts and turns the workpiece. The linear axes must follow the
+shift, plus the turn times the distance from its centre: six numbers for all positions of X, Y and Z.
 """
 
 from __future__ import annotations
@@ -51,22 +51,23 @@ from ncfix_fanuc.records import ANGLES, LARGEST_VALUE, MOST_ROTARY, SIDE, Lattic
 
 LATTICE_FILE, TABLE_LATTICE_FILE = "rotary.json", "rotary-axes.json"
 LENGTH = 100.0
-"""mm: the tool with which angles are worked out."""
+"""Length, mm, of the tool by which angles are computed."""
 PART = 0.6
-"""Share of the target for either lattice, if there are two."""
+"""Share of the target for each lattice, if there are two."""
 TRIES = ((False, False), (True, True))
-"""How a lattice is filled, until it will do: fitted to what is around points, with points only where it bends."""
+"""Ways to fill a lattice, tried in turn: (fitted by least squares around its points, points only where it bends)."""
 
 
 @frozen
 class Turning:
-    """Lattices of lengths and angles, both corrections; the tool is along Z.
+    """Tables of lengths and angles, both as corrections; the tool is along Z.
 
-    lengths  over X, Y and Z: X, Y, Z at the gauge line, mm
-    angles   about X, Y and Z, rad, under the names A, B and C
+    lengths  corrections of X, Y and Z at the gauge line over X, Y and Z, mm
+    angles   corrections about X, Y and Z over X, Y and Z, rad, under the names A, B and C
     table    the same two over the rotary axes, if there is a second lattice
-    centre   about which angles of the second turn, as X, Y and Z of the tip, mm
-    play     what else is done when an axis turns round
+    centre   point about which the angles of the second lattice turn, as X, Y and Z of the tip, mm
+    play     backlash compensation
+    length   tool length, mm
     """
 
     lengths: Grid
@@ -77,26 +78,26 @@ class Turning:
     length: float = 0.0
 
     def for_tool(self, length: float) -> Turning:
-        """With a tool of this length."""
+        """The tables with a tool of this length, mm."""
         return replace(self, length=length)
 
     @property
     def grids(self) -> tuple[Grid, ...]:
-        """All of them."""
+        """All grids."""
         return (self.lengths, self.angles, *(self.table or ()), *self.play.grids)
 
     @property
     def axes(self) -> frozenset[str]:
-        """X, Y and Z, and the rotary axes that are looked up."""
+        """X, Y and Z, and the rotary axes of the second lattice."""
         return frozenset(LINEAR) | frozenset(self.table[0].inputs if self.table else ())
 
     @property
     def points(self) -> int:
-        """The points of the lattices; lengths and angles share them."""
+        """Number of points of the lattices; lengths and angles share them."""
         return self.lengths.points + (self.table[0].points if self.table else 0) + self.play.points
 
     def at(self, names: Sequence[str], q: Array, direction: Array | None = None) -> Array:
-        """See `Tables.at`: shifts, what the turned tool adds at its tip, and what the turned table adds there."""
+        """See `Tables.at`: the shifts, plus the effects of the turned tool and the turned table at the tip."""
         columns = [names.index(axis) for axis in LINEAR]
         tool = np.array([0.0, 0.0, -self.length])
         place = q[:, columns]
@@ -215,7 +216,7 @@ class FanucRotary(FileControl):
         return Written(files, tuple(_notes(request, lattices, backlash.tables(units[0]), backlash.notes(units[0]))))
 
     def examined(self, files: Files) -> tuple[Turning | None, list[Remarks]]:
-        """The lattices and play, as the control is taken to add them."""
+        """The lattices and backlash compensation, as the control is assumed to add them."""
         found = [read_lattice(LATTICE_FILE, files.get(LATTICE_FILE, b""), linear=True)]
         if TABLE_LATTICE_FILE in files:
             found.append(read_lattice(TABLE_LATTICE_FILE, files[TABLE_LATTICE_FILE], linear=False))
@@ -233,7 +234,7 @@ class FanucRotary(FileControl):
         return Turning(*first.grids(), second[0].grids(), second[0].centre, play), remarks
 
     def reached(self, machine: Machine, tables: Tables) -> str:
-        """Without a lattice over rotary axes, nothing that they do is in it."""
+        """The reach of these tables: without a lattice over rotary axes, only L-VOL."""
         both = isinstance(tables, Turning) and tables.table is not None
         return self.reaches if both else "L-VOL"
 
@@ -243,7 +244,7 @@ class FanucRotary(FileControl):
 
 
 def _rounding(request: Request, lattice: Lattice) -> float:
-    """How far rounding can put the tip off where it is farthest from where angles turn about, mm."""
+    """Largest tip error by rounding, mm, at the place farthest from the centre of the angles."""
     length, angle = lattice.scale.rounding
     tool = np.array([0.0, 0.0, -request.tool_length])
     levers = tool[None]
@@ -258,7 +259,7 @@ def _rounding(request: Request, lattice: Lattice) -> float:
 def _notes(
     request: Request, lattices: Sequence[tuple[Lattice, Mesh]], play: Compensation, more: Iterator[str]
 ) -> Iterator[str]:
-    """What the lattices are, and what is left with the first one and with both."""
+    """Notes: the lattices, and the error that is left with the first one, and with both."""
     tables = None
     for lattice, mesh in lattices:
         counts = " x ".join(f"{name} {count}" for name, count in zip(lattice.inputs, mesh.grid.counts, strict=True))
@@ -289,7 +290,7 @@ def _notes(
 
 @frozen
 class LatticeFilling:
-    """How lattices are filled, under these settings."""
+    """The task of filling lattices, with its settings."""
 
     request: Request
     sign: str
@@ -303,7 +304,7 @@ class LatticeFilling:
         return self.request.machine
 
     def linear(self, share: float) -> tuple[Lattice, Mesh]:
-        """The lattice over X, Y and Z: exact at its points if that will do, or fitted to what is around them."""
+        """The lattice over X, Y and Z: exact at its points if that reaches the target, else fitted around them."""
         target = share * AIM * self.request.target
         found: list[tuple[Lattice, Mesh]] = []
         for area, trimmed in TRIES:
@@ -328,7 +329,7 @@ class LatticeFilling:
         return anchors(self.request, self.settings, inputs)
 
     def _lattice(self, counts: tuple[int, ...], area: bool, covered: Array) -> Lattice:
-        """Tools of two lengths tell lengths from angles."""
+        """A lattice with these numbers of points: tools of two lengths separate lengths from angles."""
         volumes = (replace(self._volume(length, area), covered=covered) for length in (0.0, LENGTH))
         bare, long = (volume.grid(counts) for volume in volumes)
         order = [bare.outputs.index(axis) for axis in LINEAR]
@@ -342,7 +343,7 @@ class LatticeFilling:
     def _as_written(
         self, lattice: Callable[[tuple[int, ...]], Lattice], volume: Volume, counts: tuple[int, ...]
     ) -> Grid:
-        """What whole numbers make of the grid with that many points."""
+        """The grid with these numbers of points, as rounded to whole numbers."""
         lengths, angles = lattice(counts).grids()
         total = lengths.values + np.cross(angles.values, (0.0, 0.0, -self.request.tool_length))
         values = total[..., [LINEAR.index(axis) for axis in volume.outputs]]
@@ -350,7 +351,7 @@ class LatticeFilling:
         return Grid(volume.inputs, nodes, volume.outputs, values)
 
     def rotary(self, share: float, most: int) -> tuple[Lattice, Mesh] | None:
-        """The lattice over the rotary axes, if the machine has tables that turn and their angles matter."""
+        """The lattice over the rotary axes; None if no table turns, or its angle does not matter."""
         inputs = table_axes(self.request)
         if not inputs:
             return None
@@ -368,7 +369,7 @@ class LatticeFilling:
 
 
 def table_axes(request: Request) -> tuple[str, ...]:
-    """The rotary axes that matter, if all of them turn the workpiece; else none."""
+    """The rotary axes on which the correction depends, if all of them turn the workpiece; else none."""
     machine = request.machine
     matter = inputs_that_matter(machine, request.space, request.tool_length)
     found = [axis.name for axis in machine.axes if axis.rotary and axis.name in matter]
@@ -378,12 +379,12 @@ def table_axes(request: Request) -> tuple[str, ...]:
 
 @frozen
 class TurningTable:
-    """What the rotary axes of a table add to the correction.
+    """The change of the correction by the rotary axes of a table.
 
-    columns  of the rotary axes
-    centre   where angles turn about: a point of the table's outer axis, as X, Y and Z of the tip, mm
-    places   positions of all axes at which it is looked at, the rotary ones at rest, (m, n_axes)
-    levers   from the centre to the tip there, (m, 3) mm
+    columns  columns of the rotary axes
+    centre   point about which the angles turn: on the table's outer axis, as X, Y and Z of the tip, mm
+    places   (m, n_axes) sampled positions of all axes, the rotary ones at rest
+    levers   (m, 3) vectors from the centre to the tip there, mm
     """
 
     machine: Machine
@@ -395,7 +396,7 @@ class TurningTable:
 
     @classmethod
     def of(cls, request: Request, inputs: Sequence[str]) -> TurningTable:
-        """Looked at in the corners of the space of X, Y and Z, and in its middle."""
+        """The table, sampled in the corners of the space of X, Y and Z, and in its middle."""
         machine, space = request.machine, request.space
         columns = tuple(machine.axis_names.index(name) for name in inputs)
         outer = max(columns)
@@ -408,7 +409,7 @@ class TurningTable:
         return cls(machine, columns, State(request.tool_length), np.round(centre, 4), places, levers)
 
     def six(self, positions: Array) -> Array:
-        """Three lengths and three angles at positions of the rotary axes (n, n_rotary), (n, 6) mm and rad."""
+        """(n, 6) three lengths, mm, and three angles, rad, at positions of the rotary axes (n, n_rotary)."""
         q = np.repeat(self.places[None], len(positions), axis=0)
         q[:, :, list(self.columns)] = positions[:, None]
         added = self._correction(q.reshape(-1, q.shape[-1])).reshape(len(positions), -1)

@@ -1,7 +1,7 @@
-"""Fanuc and its like: what differs from the RS274 family, whose interpreter and writer this one uses.
+"""Fanuc and similar controls: the differences from the RS274 family, whose interpreter and writer are used.
 
-A number may mean something else without its decimal point (`blocks`), flow control is Macro B (`flow`, `variables`,
-`system`), and some codes set other things (`data`, `lengths`, `tilt`, `coordinates`).
+A number without a decimal point may have another meaning (`blocks`), flow control is Macro B (`flow`, `variables`,
+`system`), and some codes have other effects (`data`, `lengths`, `tilt`, `coordinates`).
 Sources: Fanuc 30i operator's manual (lathe and machining centre, "Custom macro"; machining centre, "Tilted working
 plane indexing", "Polar coordinate command"), Haas mill operator's manual.
 """

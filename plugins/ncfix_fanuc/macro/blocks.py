@@ -1,11 +1,10 @@
-"""One block of Fanuc by the grammar, and by the rules that a grammar cannot say.
+"""The parsing of a Fanuc block: by the grammar, and by rules that a grammar cannot express.
 
-The decimal-point rule: which words count least increments where their number has no point.
+Decimal-point rule: the words whose numbers count least increments if they have no point.
 
-Corners that the control rounds (,R) or breaks (,C): the corner itself is corrected, the control puts in the rest.
-
-The two motions that meet must lie in one plane, and neither may be split: what they name between them is that plane,
-and words of other axes are not added to them.
+Corners that the control rounds (,R) or breaks (,C): the corner itself is corrected, the control inserts the rest. The
+two motions that meet must lie in one plane, and neither may be split. The axes that they name are that plane, so words
+of other axes are not added to them.
 Source: Fanuc 30i operator's manual (machining centre), "Optional chamfering and corner R".
 """
 
@@ -38,7 +37,7 @@ SCALED = frozenset("XYZABCUVWIJKRQ")
 DRILLING = frozenset("KLQ")
 """K and L may be the repeats of a cycle, Q is the depth of its pecks."""
 ANGLES = frozenset("IJKR")
-"""Of a rotation (G68, G68.2)."""
+"""Addresses of the angles of a rotation (G68, G68.2)."""
 
 CORNER = frozenset((",R", ",C"))
 AXES = frozenset(AXIS_LETTERS)
@@ -46,7 +45,7 @@ MOTION = AXES | frozenset(CENTRE_LETTERS)
 
 
 def is_scaled(control: MacroControl, plan: RS274Plan, letter: str) -> bool:
-    """Whether the number of a word counts least increments when it has no point."""
+    """Whether the number of a word counts least increments if it has no point."""
     codes = plan.codes
     motion = control.modal.motion if codes is None else motion_in_force(control, codes)
     if motion in control.rules.tables and letter == control.dialect.cycle_of(motion).level:
@@ -62,14 +61,14 @@ def is_scaled(control: MacroControl, plan: RS274Plan, letter: str) -> bool:
 
 
 def is_level(control: MacroControl, plan: RS274Plan) -> bool:
-    """Whether R of a block is no length: no axis, cycle, plane or setting takes it (G5.1 Q1 R3, G332 R1)."""
+    """Whether R of a block is the level of a mode (G5.1 Q1 R3, G332 R1), so not a length for axes, cycles or planes."""
     if plan.axes or plan.codes is None or not plan.codes.g.keys().isdisjoint((NON_MODAL, ROTATION)):
         return False
     return motion_in_force(control, plan.codes) not in control.rules.cycles
 
 
 def is_angle(control: MacroControl, plan: RS274Plan, letter: str) -> bool:
-    """Whether the number of a word counts degrees though its address is none of a rotary axis."""
+    """Whether the number of a word counts degrees although its address is not that of a rotary axis."""
     groups = {} if plan.codes is None else plan.codes.g
     if ROTATION in groups:
         return letter in ANGLES
@@ -79,15 +78,15 @@ def is_angle(control: MacroControl, plan: RS274Plan, letter: str) -> bool:
 
 
 def motion_in_force(control: MacroControl, codes: Codes) -> int:
-    """The motion code of a block, its own or the one that still holds."""
+    """The motion code of a block: its own, or the one in force."""
     return control.modal.motion if codes.motion is None else codes.motion
 
 
 PIECE = re.compile(r"\([^()]*(?:\([^()]*\)[^()]*)*\)|;.*|[^ \t]", re.DOTALL)
-"""What squeezing keeps: comments whole, parentheses inside them included, and characters that are not blank."""
+"""The text that squeezing keeps: whole comments, with parentheses inside them, and characters that are not blank."""
 
 CALLS = frozenset({650, 660, 661})
-"""G65, G66 and G66.1: I, J and K may stand there several times, and E is an argument like any other."""
+"""G65, G66 and G66.1: there I, J and K may occur several times, and E is an argument like any other."""
 
 
 def parse_block(dialect: Dialect, text: str) -> Parsed:
@@ -102,7 +101,7 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
 
 
 class MacroBuilder(TreeBuilder):
-    """Makes items of the trees of Macro B, too. Every number remembers whether it has a point."""
+    """Builds items from syntax trees, including those of Macro B. Every number remembers whether it has a point."""
 
     def literal(self, token: Token) -> Literal:
         """A number."""
@@ -115,7 +114,7 @@ class MacroBuilder(TreeBuilder):
         return self.statement(node, STATEMENTS[kind(node)])
 
     def statement(self, tree: Branch, keyword: str) -> OWordLine:
-        """A control statement: what it tests, and where it leads."""
+        """A control statement: its condition, and its target."""
         branches = [node for node in tree.children if not is_token(node)]
         label: str | Expression = next(
             (str(int(str(n))) for n in tree.children if is_token(n) and kind(n) == "LABEL"), ""
@@ -126,7 +125,7 @@ class MacroBuilder(TreeBuilder):
         return OWordLine(label, keyword, tuple(map(self.expression, tests)), self.span(tree))
 
     def compound(self, tree: Branch, depth: int) -> Expression:
-        """The expression that a tree stands for."""
+        """The expression of a syntax tree."""
         if kind(tree) != "two_arguments":
             return super().compound(tree, depth)
         function, left, right = tree.children
@@ -134,7 +133,7 @@ class MacroBuilder(TreeBuilder):
 
 
 STATEMENTS = {"branch": "if goto", "condition": "if then", "jump": "goto", "loop": "do", "loop_end": "end"}
-"""Rules of the grammar and the keywords that they get."""
+"""Rule of the grammar -> keyword of the statement."""
 
 
 # -- corners that the control rounds or breaks -------------------------------------------------------------------------
@@ -146,7 +145,7 @@ def letters_of(template: Template) -> frozenset[str]:
 
 
 def axes_of_corner(program: Program, block: int) -> frozenset[str] | None:
-    """The axes that a block at a corner may name, None for other blocks."""
+    """The axes that a block at a corner may name; None for other blocks."""
     own = letters_of(program.template_of(block))
     before = neighbour(program, range(block - 1, -1, -1))
     named = own | before if CORNER & before else frozenset()

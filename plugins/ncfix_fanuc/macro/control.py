@@ -1,4 +1,4 @@
-"""The control while it follows a program of the Fanuc family: what it keeps besides that of RS274."""
+"""The state of a control of the Fanuc family while it follows a program, in addition to that of RS274."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ncfix_iso.rs274.groups import Rules
 NO_POINT = "NCF240"
 DEFAULT_SYSTEM = "IS-B"
 ANGLE = ",A"
-"""The address of the angle by which a line is given."""
+"""The address of the angle of a line."""
 
 
 COMPONENTS = "IJK"
@@ -26,7 +26,7 @@ COMPONENTS = "IJK"
 
 @frozen
 class Scaling:
-    """A scaling in force: its centre, mm in the program's frame, all letters, and its factor."""
+    """A scaling in force: its centre by letter index, mm in the program's frame, and its factor."""
 
     centre: Vector
     factor: float
@@ -35,19 +35,19 @@ class Scaling:
 class MacroControl(RS274Control):
     """`RS274Control` with the decimal-point rule, polar coordinates and the variables of Macro B.
 
-    polar   radius and angle last commanded while G16 is in force, program units and degrees, NaN before the program has
-            named them; None otherwise
-    scaling        what G51 does to words; None without it
-    mirrored       letter index -> where the axis is mirrored (G51.1), mm in the program's frame
-    length_code    the code of the tool length offset in force (G43, G43.4, G44), 0 without
+    polar          last commanded radius and angle while G16 is in force, program units and degrees, NaN before the
+                   program has named them; None otherwise
+    scaling        the scaling in force (G51); None without it
+    mirrored       letter index -> position at which the axis is mirrored (G51.1), mm in the program's frame
+    length_code    code of the tool length offset in force (G43, G43.4, G44), 0 without
     length_number  the last H; None if the program has named none
-    coming         gives the shapes of the blocks that follow in the text
+    coming         returns the shapes of the blocks that follow in the text
     defining, definition  P of the tilted plane that is being defined, and its blocks so far by their Q
     dynamic        the work offset turns with the tables (G254 of Haas)
-    posture_control  the tool turns in a plane (G43.4 P1), not its axes evenly
+    posture_control  the tool turns in a plane (G43.4 P1), instead of the rotary axes evenly
     vectors        the direction of the tool is given by I J K (G43.5)
-    entering       the blocks that follow are data of tools (G10 L3)
-    outside        number of the program that the block has called, if that is in the control and not at hand
+    entering       the following blocks are tool data (G10 L3)
+    outside        number of the program that the block has called, if it is in the control and its text is not given
     """
 
     def __init__(self, run: Run, dialect: Dialect, rules: Rules) -> None:
@@ -67,21 +67,21 @@ class MacroControl(RS274Control):
         self.outside = ""
 
     def lasting(self) -> None:
-        """Not said."""
+        """None: not available for these controls; see `RS274Control`."""
 
     def path_word(self, words: Collection[str]) -> str:
-        """As of all controls of RS274; the angle of a line, and the direction of the tool (G43.5)."""
+        """See `RS274Control`; also the angle of a line, and the direction of the tool (G43.5)."""
         own = (ANGLE, *COMPONENTS) if self.vectors else (ANGLE,)
         return next((word for word in own if word in words), super().path_word(words))
 
     @property
     def turns_in_plane(self) -> bool:
-        """As of every control."""
+        """See `Control`: whether the tool turns in a plane under tool-centre-point control."""
         return self.tcp and self.posture_control
 
     @property
     def probes_nominally(self) -> bool:
-        """Never: variables hold where the machine stands, besides what a probe finds."""
+        """Always False: variables hold the machine's position, besides the result of a probe."""
         return False
 
     def stands_square(self) -> bool:
@@ -96,14 +96,14 @@ class MacroControl(RS274Control):
         super().refresh()
 
     def least_increment(self, address: str) -> float:
-        """The least increment of an address in its own unit, of the usual increment system if none is given."""
+        """The least increment of an address in its own unit; of the usual increment system if none is given."""
         steps = POINTLESS.get(self.setup.no_point) or POINTLESS[DEFAULT_SYSTEM]
         if address in INDEX and self.rotary[INDEX[address]]:
             return steps.degree
         return steps.mm if self.modal.unit == 1.0 else steps.inch
 
     def without_point(self, address: str, value: float, *, angle: bool = False) -> float:
-        """What a number without a decimal point means; asked of the setup, for nobody can see it in the program."""
+        """The value of a number without a decimal point, by the setup: the program does not show its meaning."""
         if value == 0.0 or self.setup.no_point == "calculator":
             return value
         if self.setup.no_point in POINTLESS:

@@ -1,9 +1,9 @@
-"""Codes under which the words of a block mean other coordinates: they are made those that they mean.
+"""Polar coordinates, scaling and mirror image: the words of a block are converted to plain coordinates.
 
 Polar coordinates: G16 makes the two axis words of the plane a radius and an angle, G15 ends it. Scaling: G51 X Y Z P
 magnifies the words of the program about a point, G50 ends it. Programmable mirror image: G51.1 X10. mirrors X at 10,
-G50.1 X0 ends that. A correction cannot be written in such words (a magnified digit is a coarser one); a flat program
-has no need of them.
+G50.1 X0 ends that. A correction cannot be written in such words (a magnified digit is coarser); a flat program does not
+need them.
 Sources: Fanuc 30i operator's manual (machining centre), "Polar coordinate command", "Scaling", "Programmable mirror
 image"; Haas mill operator's manual, G51; Mitsubishi M700V programming manual, where it acts on the axes that the block
 names only.
@@ -32,13 +32,13 @@ REASON = "scaling (G51) is in force; --flatten writes out what its words mean"
 TOGETHER = "what {} does while scaling (G51) is in force is not certain"
 ALIKE = "scaling (G51) is taken to act on X, Y and Z alike"
 AT_PEACE = frozenset((MOTION, PLANE, DISTANCE, FEED_MODE, CUTTER, CONTROL, RETRACT, SPINDLE_MODE))
-"""Groups of codes that scaling has nothing to do with."""
+"""Groups of codes that scaling does not affect."""
 MIRROR, MIRROR_OFF, HAAS_MIRROR = 511, 501, 1010
 SPATIAL = (X, Y, Z)
 
 
 def switch_scaling(control: MacroControl, block: Block, code: int) -> None:
-    """G51 and G50; a scaling that is not certain is not followed."""
+    """G51 and G50; a scaling whose effect is not certain is not followed."""
     if code == OFF:
         moves = bool(block.axes)
         if control.scaling is not None and not moves:
@@ -63,7 +63,7 @@ def switch_scaling(control: MacroControl, block: Block, code: int) -> None:
 
 
 def is_certain(control: MacroControl, block: Block) -> bool:
-    """Whether factor and centre are in the block, or where the control stands, and mean one thing only."""
+    """Whether factor and centre are given by the block, or the position, and have one possible meaning only."""
     named = {index for index in (X, Y, Z) if LETTERS[index] in block.values}
     known = not control.unknown.keys() & ({X, Y, Z} - named) and not block.unknown
     plain = "P" in block.values and block.values["P"] > 0 and block.values.keys().isdisjoint(CENTRE_LETTERS)
@@ -73,7 +73,7 @@ def is_certain(control: MacroControl, block: Block) -> bool:
 
 
 def scaled(control: MacroControl, block: Block, codes: Codes) -> Block:
-    """The block with its words made what they mean."""
+    """The block with scaled words converted to plain ones."""
     scaling = control.scaling
     if scaling is None or OFF in codes.g.values():
         return block
@@ -115,7 +115,7 @@ def mirror(control: MacroControl, block: Block, code: int) -> None:
 
 
 def mirror_about_zero(control: MacroControl, block: Block, code: int) -> None:
-    """G101 and G100 of Haas: the axes named run the other way, from the zero point; another value is not followed."""
+    """G101 and G100 of Haas: the named axes are mirrored at the zero point; other values are not followed."""
     if code == HAAS_MIRROR and any(block.values[LETTERS[index]] for index in words_of(block)):
         unfollowed(control, block, MIRROR)
     else:
@@ -123,7 +123,7 @@ def mirror_about_zero(control: MacroControl, block: Block, code: int) -> None:
 
 
 def map_on_cylinder(control: MacroControl, block: Block, code: int) -> None:
-    """G107 of Haas: with axes on, without any off."""
+    """G107 of Haas: on with axis words, off without any."""
     if block.axes:
         control.suspend("cylinder", "an axis is led round a cylinder (G107), which ncfix does not follow")
     elif control.resume("cylinder"):
@@ -136,7 +136,7 @@ def turned(control: MacroControl) -> bool:
 
 
 def put_up(control: MacroControl) -> None:
-    """Take the mirrors into force."""
+    """Put the mirrors into force."""
     centre = zeros()
     for index, place in control.mirrored.items():
         centre[index] = place
@@ -164,7 +164,7 @@ def switch_polar(control: MacroControl, block: Block, code: int) -> None:
 
 
 def cartesian(control: MacroControl, block: Block) -> Block:
-    """The block with radius and angle made coordinates of the plane; where a radius is added is not followed."""
+    """The block with radius and angle converted to coordinates of the plane; an incremental radius is not followed."""
     plane = control.modal.plane
     letters = plane.of(LETTERS)
     given = [letter for letter in letters if letter in block.values]
@@ -188,7 +188,7 @@ def cartesian(control: MacroControl, block: Block) -> Block:
 
 
 def further_round(control: MacroControl, block: Block, letters: tuple[str, str]) -> Block:
-    """A block in G91 with an angle alone: it is added to the one in force, by each repeat of a cycle anew."""
+    """A block in G91 with an angle alone: it is added to the one in force, again with each repeat of a cycle."""
     assert control.polar is not None
     plane, (radius, angle) = control.modal.plane, control.polar
     block.turn = block.values[letters[1]]

@@ -1,4 +1,4 @@
-"""G10 of these controls: work offsets (L2, L20) and tool lengths (L10); the other kinds change what is not followed.
+"""G10 of these controls: work offsets (L2, L20) and tool lengths (L10); other data are not followed.
 
 Source: Fanuc 30i operator's manual (machining centre), "Programmable data input".
 """
@@ -42,7 +42,7 @@ MADE = {
     720: "holes along a line (G72)",
     2530: "the turn of the tool square to a feature coordinate system (G253)",
 }
-"""Motions that the control makes up."""
+"""Motions whose path the control generates."""
 SQUARE = 2530
 
 SETTING_ERRORS = {
@@ -79,14 +79,14 @@ def setting_error(control: RS274Control, block: Block, code: int) -> None:
 
 
 def made(control: RS274Control, block: Block, code: int) -> None:
-    """A text or a pocket that the control mills by itself, and the way back from a reference point."""
+    """A motion whose path the control generates: a text, a pocket, or the way back from a reference point."""
     make_up(control, block, MADE[code], control.turning if code == SQUARE else ())
 
 
 def circular_pocket(control: RS274Control, block: Block, code: int) -> None:
-    """G12 and G13 of Haas: at feed to the middle of the pocket, at its depth, where they end, too.
+    """G12 and G13 of Haas: a feed to the centre of the pocket, at its depth, where the cycle ends.
 
-    The circles about it move with it. Passes of other depths (L, in G91) have no one bottom.
+    The circles about the centre move with it. Passes at several depths (L, in G91) have no single bottom.
     Source: Haas, "Mill operator's manual": G12 and G13, X and Y in their block.
     """
     modal = control.modal
@@ -100,7 +100,7 @@ def circular_pocket(control: RS274Control, block: Block, code: int) -> None:
 
 
 def circular_pocket_here(control: RS274Control, block: Block, code: int) -> None:
-    """G12 and G13 of Mitsubishi: about where the tool stands; nothing is known of axis words beside them."""
+    """G12 and G13 of Mitsubishi: about the position of the tool; the meaning of axis words beside them is not known."""
     if block.axes:
         make_up(control, block, MADE[code])
         return
@@ -109,7 +109,7 @@ def circular_pocket_here(control: RS274Control, block: Block, code: int) -> None
 
 
 def set_data(control: MacroControl, block: Block, code: int) -> None:
-    """G10; a block without L takes tool lengths on old controls."""
+    """G10; without L, a block with P sets tool lengths, as on old controls."""
     kind = whole(block.get("L", 10.0 if "P" in block.values else -1.0), "L of G10")
     control.entering = kind == TOOL_LIFE
     if kind == 2:
@@ -185,7 +185,7 @@ def set_length(control: RS274Control, block: Block) -> None:
 
 
 def keep_length(control: RS274Control, number: int, length: Value) -> None:
-    """The program sets the length of a tool, mm."""
+    """Store the length of a tool that the program sets, mm."""
     unknown = isinstance(length, Unknown)
     if control.tools.offset == number and (unknown or length != control.tools.vector[Z]):
         control.suspend(CHANGED, CHANGED)

@@ -1,9 +1,9 @@
-"""Where a program of Macro B goes on: GOTO, IF, WHILE, and the calls M98, G65 and G66, as operations.
+"""The flow of a program of Macro B: GOTO, IF, WHILE, and the calls M98, G65 and G66, as operations.
 
 Source: Fanuc 30i operator's manual, "Custom macro", "Branch and repetition", "Macro call", "Argument specification";
 "Subprogram".
 
-Programs of the machine's builder or of a probe's maker, O8000 to O9999, are in the control, not at hand.
+Programs of the machine's builder or of a probe's maker, O8000 to O9999, are in the control; their text is not given.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ TAKEN = "the program O{label} is not at hand, and is taken to leave offsets, too
 
 
 def ran(control: MacroControl, label: str) -> None:
-    """Such a program has run."""
+    """Apply the assumed effect of a program whose text is not given: positions are lost, offsets and modes stay."""
     control.warn(
         NOT_AT_HAND, TAKEN.format(label=label), "check what it sets, or say where its file is: --subprograms DIR"
     )
@@ -60,7 +60,7 @@ ONCE = dict(
 """Argument specification I: one variable for each address."""
 
 SETS = 10
-"""Argument specification II: I J K may stand so many times."""
+"""Argument specification II: largest number of times that I J K may occur."""
 
 LENGTHS = frozenset("ABCIJKQRUVWXYZ")
 """Arguments whose numbers count least increments of their address when they have no decimal point."""
@@ -95,18 +95,18 @@ def named_programs(unit: RS274Unit) -> dict[int, str]:
 
 
 def head_of(template: Template) -> Span | None:
-    """Where the name stands that begins a program, if the block is nothing else."""
+    """The span of the name that begins a program, if the block has nothing else; else None."""
     items = [item for item in template.items if not isinstance(item, Comment)]
     alone = len(items) == 1 and isinstance(items[0], Opaque) and items[0].kind == "text word"
     return items[0].span if alone else None
 
 
 class Outline:
-    """What control statements of one text refer to.
+    """The targets of the control statements of one text.
 
-    programs  number (or name) of each program -> the block of its O-word
+    programs  number (or name) of each program -> block of its O-word
     starts    the blocks of O-words, ascending
-    partner   block of a DO -> that of its END, and the other way round
+    partner   block of a DO -> block of its END, and the reverse
     """
 
     def __init__(self, unit: RS274Unit) -> None:
@@ -144,7 +144,7 @@ class Outline:
         return self.unit.program.column("N")
 
     def numbered(self, target: int, block: int) -> int:
-        """The block with that N word in the program that `block` stands in: the next one, else the first."""
+        """The block with N word `target` in the program of `block`: the next one behind it, else the first."""
         at = bisect_right(self.starts, block)
         first = self.starts[at - 1] if at else 0
         stop = self.starts[at] if at < len(self.starts) else self.unit.stop
@@ -156,11 +156,11 @@ class Outline:
 
 
 class MacroFlow(ProgramFlow[RS274Unit]):
-    """Where execution stands.
+    """The state of execution.
 
-    find         gives the text of a file by the number or name of its program
-    in_parts     only a part of the text is known; `heads`: numbers and names of the program itself
-    looked       a subprogram has been looked for
+    find      returns the text of a file by the number or name of its program
+    in_parts  only a part of the text is known; `heads`: numbers and names of the program itself
+    looked    a subprogram has been searched
     """
 
     most_calls = 15
@@ -192,13 +192,13 @@ class MacroFlow(ProgramFlow[RS274Unit]):
         self.heads |= outline.programs.keys()
 
     def unfinished(self) -> Fault | None:
-        """What is wrong if the text ends here: a subprogram without M99."""
+        """The fault if the text ends here, inside a subprogram without M99; None if there is none."""
         return Fault(BAD_JUMP, f"the program O{self.calls[-1].name} ends without M99") if self.calls else None
 
     # -- statements ---------------------------------------------------------------------------------------------------
 
     def lowered(self, line: FlowLine, unit: RS274Unit, block: int) -> tuple[Operation, ...]:
-        """What a statement comes down to."""
+        """The operations of a statement."""
         outline = self.outline_of(unit)
         partner = outline.partner.get(block, -1)
         match line.keyword:
@@ -225,11 +225,11 @@ class MacroFlow(ProgramFlow[RS274Unit]):
         raise AssertionError("there are no other statements")
 
     def stop(self, text: str) -> None:
-        """The control stops."""
+        """Raise the fault with which the control stops."""
         raise Fault(BAD_JUMP, text)
 
     def check_returned(self) -> None:
-        """An O-word is the head of the program that runs, or that of the next one, but none of one that is called."""
+        """Raise a fault at an O-word inside a called program, which has not returned."""
         fault = self.unfinished()
         if fault is not None:
             raise fault
@@ -256,7 +256,7 @@ class MacroFlow(ProgramFlow[RS274Unit]):
         self.follow((Call(lambda: self.called(label, times, arguments)),))
 
     def called(self, label: str, times: int, arguments: Store | None) -> OpenCall[RS274Unit] | None:
-        """The call of a program; None where it is not executed, or is one of the builder's that is not at hand."""
+        """The call of a program; None if it is not executed, or is one of the builder's whose text is not given."""
         if times < 1:
             self.control.refuse_rest(NO_REPEATS)
             return None
@@ -313,9 +313,9 @@ class MacroFlow(ProgramFlow[RS274Unit]):
         self.enter(OpenCall(f"N{target}", (self.unit, found), times - 1))
 
     def come_back(self, target: int | None) -> None:
-        """M99: return, to a block N if one is named, or run again if the call asked for several times.
+        """M99: return, to block N if one is named, or run again if the call has repeats left.
 
-        In the main program it goes to that block, or to the start, where ncfix takes it as the end.
+        In the main program: go to that block, or end (the control would start again).
         """
         if target is None:
             self.follow((Return(),))

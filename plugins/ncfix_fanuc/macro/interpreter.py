@@ -35,14 +35,14 @@ SUBPROGRAM, LOCAL_SUBPROGRAM, RETURN = (980, 1980), 970, 990
 BY_ANGLE = "a line that is given by its angle (,A) is not followed"
 AFTER_ANGLE = "where the axis {} stands after a line that is given by its angle (,A) is not followed"
 BEFORE_CALL = "GMFST"
-"""Words that take effect before a macro is called, where they stand before the call."""
+"""Words that take effect before a macro is called if they stand before the call."""
 BESIDE_CALL = "a code before G65 is computed, so the program cannot be written out flat"
 MODAL_CALL = "G66 calls the program O{}, which is not at hand, so the program cannot be written out flat"
 NAME = re.compile(r"<(?P<angle>[^<>]+)>|\"(?P<quoted>[^\"]+)\"")
 
 
 def is_called(program: Program) -> bool:
-    """Whether a text is no program of its own: it returns (M99) and never ends (M2, M30)."""
+    """Whether a text is a subprogram: it returns (M99) and never ends (M2, M30)."""
     codes = {code for template in program.templates for code in template.m_codes}
     return RETURN in codes and codes.isdisjoint(PROGRAM_ENDS)
 
@@ -71,7 +71,7 @@ class MacroInterpreter(RS274Interpreter):
         self.cornered = False
 
     def prepared(self) -> MacroFlow:
-        """Give the control its own variables; where execution begins."""
+        """Give the control its variables, and return the flow at the begin of the program."""
         control = self.control
         control.parameters.persistent = lambda number: None
         control.parameters.live = system.positions(control) | system.modes(control) | system.offsets(control)
@@ -86,7 +86,7 @@ class MacroInterpreter(RS274Interpreter):
 
     @property
     def to_the_last(self) -> bool:
-        """See `Interpreter`: a subprogram that was looked for in files may stand behind the end of the program."""
+        """See `Interpreter`: a subprogram that was searched in files may stand behind the end of the program."""
         return self.flow.looked
 
     def next_part(self, program: Program, blocks: int) -> None:
@@ -102,7 +102,7 @@ class MacroInterpreter(RS274Interpreter):
             raise NotInPartsError("what follows a tool length is in the next part")
 
     def lane_is_open(self, plan: RS274Plan) -> bool:
-        """Not while a macro is called after every motion, words are polar or directions, or a corner is put in."""
+        """See `RS274Interpreter`; not during a modal macro call, with polar, scaled or vector words, or at a corner."""
         control = self.control
         special = control.polar is not None or control.scaling is not None or control.vectors or control.entering
         return super().lane_is_open(plan) and not (special or self.modal_calls or self.cornered)
@@ -110,17 +110,20 @@ class MacroInterpreter(RS274Interpreter):
     # -- one block ----------------------------------------------------------------------------------------------------
 
     def execute(self, plan: RS274Plan, unit: RS274Unit, block: int) -> bool:
-        """Execute a block; True if the program ends there. A flat program has no conditions left to say it with."""
+        """Execute a block; True if the program ends there.
+
+        Except while flattening, `set_in_doubt` handles blocks that set variables on a condition known at run time.
+        """
         flow = plan.flow
         if flow is not None and flow.keyword == "if then" and not self.watcher and self.set_in_doubt(plan, flow):
             return False
         return super().execute(plan, unit, block)
 
     def set_in_doubt(self, plan: RS274Plan, flow: FlowLine) -> bool:
-        """Take a block that only sets variables on a condition known at run time: they are not known from then on.
+        """Handle a block that only sets variables if a condition holds that is known only at run time.
 
-        False: it is another block. Alarms and messages that depend on the condition do no harm: where the program goes
-        on, none was raised.
+        The variables are not known from then on. False for any other block. Alarms and messages that depend on the
+        condition are harmless: if the program goes on, none was raised.
         """
         alone = plan.assignments and not (plan.letters or plan.template.g_codes or plan.template.m_codes)
         if not alone or not isinstance(flow.arguments[0](self.control), Unknown):
@@ -168,7 +171,7 @@ class MacroInterpreter(RS274Interpreter):
         return ended
 
     def without_vacant(self, plan: RS274Plan) -> RS274Plan:
-        """The plan without the words whose value is a vacant variable: they count as not written."""
+        """The plan without words whose value is a vacant variable, which count as not written."""
         if not plan.computed and not plan.code_words:
             return plan
         spans = [span for _, function, span in plan.computed if is_vacant(function(self.control))]
@@ -183,10 +186,10 @@ class MacroInterpreter(RS274Interpreter):
         return self.reduced[key]
 
     def evaluate(self, plan: RS274Plan, index: int) -> Block:
-        """The values of a block, by the decimal-point rule, polar coordinates made Cartesian."""
+        """The values of a block, with the decimal-point rule applied, and polar and scaled words converted."""
         block = super().evaluate(plan, index)
         if plan.assignments:
-            block.unknown |= {letter for letter, _, _ in plan.computed}  # set sooner or later than they are read
+            block.unknown |= {letter for letter, _, _ in plan.computed}  # whether they are set before is not certain
         codes = set() if plan.codes is None else set(plan.codes.g.values())
         self.at_once(codes)
         self.take_points(plan, block)
@@ -201,7 +204,7 @@ class MacroInterpreter(RS274Interpreter):
         return block if plan.codes is None else coordinates.scaled(self.control, block, plan.codes)
 
     def take_points(self, plan: RS274Plan, block: Block) -> None:
-        """Numbers without a decimal point count increments, or as the setup says."""
+        """Convert numbers without a decimal point as the setup says."""
         for letter in plan.pointless:
             if is_scaled(self.control, plan, letter):
                 self.span = plan.span_of(letter)
@@ -210,7 +213,7 @@ class MacroInterpreter(RS274Interpreter):
         self.span = None
 
     def at_once(self, codes: set[int]) -> None:
-        """Unit, plane, G90 and G91 of a block already say what its own numbers mean."""
+        """Apply unit, plane, G90 and G91 of a block, which determine the meaning of its own numbers."""
         modal = self.control.modal
         if codes & {G20, G21}:
             units(self.control, None, G20 if G20 in codes else G21)
@@ -220,7 +223,7 @@ class MacroInterpreter(RS274Interpreter):
             modal.plane = PLANES[code]
 
     def settings(self, codes: Codes, block: Block) -> None:
-        """What a block sets before its motion; H alone sets something, too."""
+        """Apply the settings of a block before its motion, including an H word alone."""
         before = self.control.tools.vector[Z]
         super().settings(codes, block)
         lone_number(self.control, block, codes)
@@ -269,7 +272,7 @@ class MacroInterpreter(RS274Interpreter):
         return modal or super().calls_behind(block, codes)
 
     def by_vector(self, block: Block, codes: Codes, motion: int) -> None:
-        """The motion of a block while I J K say where the tool points; rotary axes never get words of their own."""
+        """The motion of a block while I J K give the direction of the tool; rotary axes get no words of their own."""
         control, axes = self.control, self.control.turning
         before, why = control.refusal, "" if MACHINE in codes.g.values() else tilt.directed(control, block, motion)
         control.refusal = before or why
@@ -282,7 +285,7 @@ class MacroInterpreter(RS274Interpreter):
     # -- calls and ends -----------------------------------------------------------------------------------------------
 
     def after(self, codes: Codes, block: Block) -> bool:
-        """What a block does last: M2, M30, calls and returns. True if the program ends."""
+        """Apply the end of a block: M2, M30, calls and returns. True if the program ends."""
         if codes.stop in PROGRAM_ENDS:
             return True
         if codes.call == RETURN:
@@ -296,13 +299,13 @@ class MacroInterpreter(RS274Interpreter):
         return False
 
     def returned(self, block: Block) -> bool:
-        """M99: back to the caller; in the main program, to block P or to the start, where ncfix takes it as the end."""
+        """M99: return to the caller; in the main program, go to block P, or end (instead of starting again)."""
         target = whole(block.get("P"), "P of M99") if "P" in block.values else None
         self.flow.come_back(target)
         return self.flow.ended
 
     def subprogram(self, block: Block) -> None:
-        """M98 Pn Ln Qn; the repeats may stand before four digits of the number, Q is the block to begin at."""
+        """M98 Pn Ln Qn; repeats may also precede the four digits of the program number; Q is the first block."""
         if "H" in block.values:
             raise Fault(BAD_JUMP, "M98 with H means other things on other controls", "split the subprogram in two")
         name, times = self.named_program(), calls_of(block)
@@ -320,13 +323,13 @@ class MacroInterpreter(RS274Interpreter):
             self.flow.jump(self.flow.numbered(whole(block.values["Q"], "Q of M98")))
 
     def is_there(self, label: str) -> bool:
-        """Whether there is a program of that number."""
+        """Whether there is a program with this number."""
         self.flow.looked = True
         outline = self.flow.outline_of(self.main)
         return label in outline.programs or self.find(label) is not None
 
     def named_program(self) -> str:
-        """The name of a program that is called by name, `M98<NAME>`."""
+        """The name of a program that the block calls by name, `M98<NAME>`; "" without."""
         unit, block = self.flow.unit, self.flow.block - 1
         for item in unit.program.items_of(block):
             if isinstance(item, Opaque) and item.kind == "text word":
@@ -337,9 +340,9 @@ class MacroInterpreter(RS274Interpreter):
     # -- macros -------------------------------------------------------------------------------------------------------
 
     def before_call(self, plan: RS274Plan, index: int) -> str:
-        """Execute what a block sets before it calls a macro: codes and variables; behind the call M is an argument.
+        """Execute the codes and assignments before a macro call; behind the call, M is an argument.
 
-        Returns the codes, for a flat program; raises `Fault` there if one is computed.
+        Returns the text of the codes, for a flat program; raises `Fault` while flattening if one is computed.
         """
         items = plan.template.items
         call = next(place for place, item in enumerate(items) if isinstance(item, Word) and self.calls(item))
@@ -354,13 +357,13 @@ class MacroInterpreter(RS274Interpreter):
         return " ".join(self.flow.unit.program.slice(index, word.span) for word in words)
 
     def calls(self, word: Word) -> bool:
-        """Whether a word is a code that calls a macro, or ends that."""
+        """Whether a word is a code that calls a macro, or ends modal calls."""
         if word.address != "G" or not isinstance(word.value, Constant):
             return False
         return self.control.rules.g_groups.get(round(10 * word.value.value)) == MACRO
 
     def macro(self, plan: RS274Plan, codes: Codes, before: str) -> None:
-        """G65 calls a macro once, G66 after every motion that follows, G67 ends that; `before` stays if it is flat."""
+        """G65 calls a macro once, G66 after every following motion, G67 ends that; `before`: for a flat program."""
         code = codes.g[MACRO]
         if self.watcher and before and code != G65:
             self.watcher.write(before)
@@ -415,6 +418,6 @@ class MacroInterpreter(RS274Interpreter):
                 raise Fault(RUNTIME, MODAL_CALL.format(call.label))
 
     def is_outside(self) -> bool:
-        """Whether the program that was called just now is in the control; a flat program calls it, too."""
+        """Whether the program called just now is in the control, so that a flat program must call it, too."""
         label, self.control.outside = self.control.outside, ""
         return bool(label)

@@ -27,25 +27,25 @@ if TYPE_CHECKING:
 
 
 SPELLING = Spelling(vector=CENTRE_LETTERS, vector_length=True)
-"""I J K of G43.5, in the length that the program gives them."""
+"""I J K of G43.5 are written with the length that the program gives the vector."""
 
 STOPPING = frozenset({5.0, 9.0})
 STOPS = frozenset({50, 90})
 """M5 and M9: with a motion in their block many controls execute them at its end; the tool must not cut without them."""
 
 ELSEWHERE = frozenset({970, 990})
-"""M97 calls what stands in the text, M99 would end a subprogram in it."""
+"""M97 calls a block of the same text, M99 may end a subprogram in it."""
 
 
 def runs_straight_on(template: Template) -> bool:
-    """Whether a block of this shape has nothing to do with others elsewhere in the text, as jumps and corners have."""
+    """Whether a block of this shape does not depend on blocks elsewhere in the text, as jumps and corners do."""
     flows = [item.keyword for item in template.items if isinstance(item, OWordLine)]
     free = ELSEWHERE.isdisjoint(template.m_codes) and CORNER.isdisjoint(letters_of(template))
     return free and all(keyword == "program" for keyword in flows)
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
-    """What blocks need to be written many at a time; those with a number without a point are not."""
+    """The layout for writing blocks of this shape in bulk; None for shapes with a number without a point."""
     words = program.template_of(block).words
     if any(isinstance(word.value, Literal) and word.value.pointless for word in words if word.address not in "NFS"):
         return None
@@ -57,7 +57,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
 
 
 def one_by_one(program: Program, moves: Moves, _pieces: Pieces, _first_piece: Ints) -> Mask:
-    """(n,) straight motions with I J K: there these give the direction of the tool (G43.5)."""
+    """(n,) motions that are not written in bulk: straight ones with I J K, the direction of the tool (G43.5)."""
     shapes = [any(word.address in CENTRE_LETTERS for word in template.words) for template in program.templates]
     pointed: Mask = np.array(shapes, dtype=np.bool_)[program.template[moves.block]]
     pointed &= moves.kind != MotionKind.ARC
@@ -65,7 +65,7 @@ def one_by_one(program: Program, moves: Moves, _pieces: Pieces, _first_piece: In
 
 
 def layout(program: Program, block: int) -> Layout | None:
-    """The layout of a block; at a corner that the control rounds, axes outside its plane get no words."""
+    """The layout of a block; at a corner that the control rounds or breaks, axes outside its plane get no words."""
     found = writable(program, block)
     if found is None:
         return None

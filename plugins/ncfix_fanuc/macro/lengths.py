@@ -40,18 +40,18 @@ NOTHING = 1e-12
 PLAIN_CANCEL = 490
 CANCEL = (PLAIN_CANCEL, 491)
 SAME = {491: PLAIN_CANCEL, BY_VECTOR: BY_ANGLE, HAAS_TIP: BY_ANGLE}
-"""What codes do to the length of the tool."""
+"""Codes of tool lengths with the same effect on the length as another code."""
 
 G90, G91 = 900, 910
 REFERENCE = frozenset((280, 300, 530))
 ENDS = frozenset((20, 300))
 CALLS = frozenset((970, 980, 990, 1980))
 MOVING = frozenset("XYABCUVWIJKRP")
-"""Addresses of blocks that move something, or call what may."""
+"""Addresses in blocks that move something, or call a program that may."""
 
 
 def tool_offset(control: MacroControl, block: Block, code: int) -> None:
-    """G43 to G49. Without a Z word the axis moves by the change of the length, or only its coordinate does."""
+    """G43 to G49. Without a Z word, controls differ: the axis moves by the change of length, or Z changes instead."""
     before = control.tools.vector[Z]
     control.resume(CHANGED)
     direct(control, block, code)
@@ -77,9 +77,9 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
 
 
 def direct(control: MacroControl, block: Block, code: int) -> None:
-    """G43.5 takes the direction of the tool from I J K; its Q would lean the tool away from them.
+    """Set how the tool is directed: by I J K in G43.5 (Q, an inclination from them, is not followed).
 
-    P1 of both turns the tool in a plane.
+    P1 of G43.4 and G43.5 turns the tool in a plane.
     """
     control.resume(INCLINED)
     kind = block.get("P") if code in TIP_CONTROL else 0.0
@@ -94,7 +94,7 @@ def direct(control: MacroControl, block: Block, code: int) -> None:
 
 
 def z_is_named_first(control: MacroControl) -> bool:
-    """Whether Z is named, or the program ends, before anything else moves: then nothing rests on where Z stands."""
+    """Whether Z is named, or the program ends, before anything else moves, so that the place of Z does not matter."""
     incremental = control.modal.incremental
     for shape in control.coming():
         words = {word.address for word in shape.words}
@@ -111,7 +111,7 @@ def z_is_named_first(control: MacroControl) -> bool:
 
 
 def lone_number(control: MacroControl, block: Block, codes: Codes) -> None:
-    """An H word in a block without G43: another length, at once where one is in force."""
+    """Apply an H word in a block without G43: another length, which acts at once if one is in force."""
     if "H" not in block.values or LENGTH in codes.g or codes.call is not None:
         return
     if control.length_code:

@@ -1,6 +1,6 @@
-"""Rows of holes that Haas and Mitsubishi work out by themselves: the canned cycle in force at each place.
+"""Patterns of holes of Haas and Mitsubishi controls: the control executes the canned cycle in force at each place.
 
-One text cannot correct them all, so they are refused as they stand, and `--flatten` writes them out.
+One block cannot hold different corrections for all holes, so patterns are refused, and `--flatten` writes them out.
 Source: Haas, "Mill operator's manual": G70, G71; Mitsubishi, "M800/M80, programming manual (machining centre)",
 "Special fixed cycle": G34 to G37.1.
 """
@@ -24,29 +24,29 @@ if TYPE_CHECKING:
 
 Words = dict[str, float]
 Places = Iterator[tuple[float, float]]
-"""From the middle or the first place of a pattern, in program units."""
+"""(x, y) of each hole, relative to the centre or the first place of the pattern, in program units."""
 
 
 def around(words: Words, step: float, count: int) -> Places:
-    """On a circle with the radius I, from the angle J on, counter-clockwise."""
+    """Holes on a circle of radius I, from angle J on, `step` degrees apart, counter-clockwise."""
     radius, start = words.get("I", 0.0), words.get("J", 0.0)
     turns = (math.radians(start + step * place) for place in range(count))
     return ((radius * math.cos(turn), radius * math.sin(turn)) for turn in turns)
 
 
 def bolt_circle(words: Words, count: int) -> Places:
-    """Evenly round a circle; a negative number of holes means clockwise."""
+    """Holes evenly round a circle; a negative number means clockwise."""
     return around(words, 360.0 / count, abs(count))
 
 
 def line(words: Words, count: int) -> Places:
-    """At the distance I of each other, at the angle J, the first at the place itself."""
+    """Holes on a line at angle J, a distance I apart, the first at the place itself."""
     along, turn = words.get("I", 0.0), math.radians(words.get("J", 0.0))
     return ((along * place * math.cos(turn), along * place * math.sin(turn)) for place in range(count))
 
 
 def grid(words: Words, count: int) -> Places:
-    """P by K places, I and J from each other, the first at the place itself; every other row runs back."""
+    """Holes in a grid of P by K places, I and J apart, the first at the place itself; every second row runs back."""
     across = round(words.get("P", 0.0))
     for row in range(count):
         columns = range(across) if row % 2 == 0 else range(across - 1, -1, -1)
@@ -54,7 +54,13 @@ def grid(words: Words, count: int) -> Places:
 
 
 class Pattern(NamedTuple):
-    """A code: what it makes, how many (the address of that number), the words it needs, and where they lie."""
+    """A pattern code.
+
+    name    its name in words
+    many    address of the number of holes
+    needs   addresses of the words that it needs
+    places  returns the places of the holes
+    """
 
     name: str
     many: str
@@ -78,7 +84,7 @@ AFTER_PATTERN = "where the axis {} stands after a pattern of holes is not follow
 
 
 def pattern(control: RS274Control, block: Block, code: int) -> None:
-    """The canned cycle in force at each place; the middle or the first is in the block, or where the axes stand."""
+    """Execute the canned cycle in force at each place; the block, or the position, gives the centre or first place."""
     made, modal = PATTERNS[code], control.modal
     count = block.get(made.many)
     plain = not (modal.incremental or modal.diameter or block.unknown) and modal.plane.code == G17
@@ -102,9 +108,9 @@ def pattern(control: RS274Control, block: Block, code: int) -> None:
 
 
 def check_points(control: MacroControl, plan: RS274Plan, block: Block, code: int) -> None:
-    """Lengths and angles of a pattern without a decimal point mean what they say, or are asked for.
+    """Check lengths and angles of a pattern that have no decimal point: the setup must say what they mean.
 
-    Raises `Fault` where numbers without a point count increments: which of these words do so too is not sure.
+    Raises `Fault` if numbers without a point count increments, because it is not sure which of these words do.
     """
     counts = {PATTERNS[code].many, "P" if code == GRID else ""}
     for letter in sorted({*plan.pointless} & {*"IJKP"} - counts):

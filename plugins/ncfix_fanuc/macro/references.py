@@ -24,14 +24,14 @@ NO_LENGTH = 490
 
 
 def check(control: RS274Control, block: Block, code: int) -> None:
-    """G27: to the words, which should be a reference point."""
+    """G27: a rapid to the words, which should be a reference point."""
     if block.axes:
         end = destination(control, block)
         control.make(Motion(MotionKind.RAPID, block.axes, end, control.modal.motion, passing=CHECKED))
 
 
 def named(control: RS274Control, block: Block, code: int) -> None:
-    """G28: the axes that are named go; whether all go where none is named, differs."""
+    """G28: the named axes go to the reference point; if none is named, controls differ in whether all go."""
     if block.axes:
         go_to_reference(control, block, code)
         return
@@ -42,7 +42,7 @@ def named(control: RS274Control, block: Block, code: int) -> None:
 
 
 def cancelling(control: MacroControl, block: Block, code: int) -> None:
-    """G28 of Haas takes the tool length offset away as well."""
+    """G28 of Haas, which also cancels the tool length offset."""
     go_to_reference(control, block, code)
     if control.length_code:
         control.length_code = 0
@@ -50,7 +50,7 @@ def cancelling(control: MacroControl, block: Block, code: int) -> None:
 
 
 def further(control: RS274Control, block: Block, code: int) -> None:
-    """G30 Pn: by way of the words; where the third and fourth reference points are is not given."""
+    """G30 Pn: by way of the words to a further reference point; the third and fourth are not known."""
     number = whole(block.get("P", SECOND), "P of G30")
     if number == SECOND:
         go_to_reference(control, block, code)

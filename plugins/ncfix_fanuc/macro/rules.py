@@ -1,9 +1,9 @@
-"""Which codes controls of the Fanuc family know, and what they do where they differ from the common core.
+"""The codes of controls of the Fanuc family, and their effects where they differ from the common core.
 
 Sources: Fanuc 30i operator's manual (machining centre), "G code list"; Haas mill operator's manual, "G codes";
 Mitsubishi M700V programming manual. Codes are in tenths: G68.2 is 682.
 
-Canned cycles where Fanuc differs from LinuxCNC: R and the depth stay in force as levels, whatever G90 or G91 says.
+Canned cycles differ from those of LinuxCNC: R and the depth stay in force as levels, whatever G90 or G91 says.
 
 Source: Fanuc 30i operator's manual (machining centre), "Canned cycle for drilling": in G91 R counts from the initial
 level and the depth from R, in the block that names them.
@@ -32,7 +32,7 @@ FOREIGN = frozenset(
         *(*groups.TURNING_CYCLES, *groups.PROBES, *groups.SPLINES, 331, 760, 431, 432, 411, 421, 890),
     }
 )
-"""Codes of LinuxCNC that mean nothing, or something else, on these controls."""
+"""Codes of LinuxCNC that have no meaning, or another one, on these controls."""
 
 FANUC_G = {code: group for code, group in ISO_G.items() if code not in FOREIGN} | {
     650: MACRO,
@@ -60,7 +60,7 @@ ALL_CYCLES = frozenset((*groups.CYCLES, 760, 842, 843))
 """G76 bores here; G84.2 and G84.3 tap."""
 
 FANUC_HARMLESS = (groups.ISO_HARMLESS_G - {630}) | {54, 401, 502, 805}
-"""G5.4 is about the servo drives; G40.1, G50.2 and G80.5 end what is refused where it begins."""
+"""G5.4 concerns the servo drives; G40.1, G50.2 and G80.5 end functions that are refused where they begin."""
 
 FANUC_M = grouped(
     STOP=(0, 10, 20, 300), TOOL=(60,), SPINDLE=(30, 40, 50, 190), COOLANT=(70, 80, 90), CALL=(970, 980, 990, 1980)
@@ -88,7 +88,7 @@ def cycle(control: RS274Control, block: Block, code: int) -> None:
 
 
 def take_levels(control: RS274Control, block: Block, initial: float, letter: str = "R") -> None:
-    """R and the depth of the block as levels in the program's frame, mm; those not named stay in force.
+    """Set R and the depth of the block as levels in the program's frame, mm; those not named stay in force.
 
     letter  the address of R
     """
@@ -186,8 +186,8 @@ HAAS = replace(
     adds_rotations=True,
 )
 HAAS = groups.with_m_code(HAAS, HAAS_JUMP, (Refuse(BY_INPUT),))
-"""Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), mills texts and pockets by itself,
-pecks by I J K, and M96 P Q jumps while an input is off."""
+"""Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), mills texts and pockets on its own, pecks
+by I J K, and jumps by M96 P Q while an input is off."""
 
 MITSUBISHI_MADE = (*CIRCULAR_POCKETS, *MITSUBISHI_PATTERNS)
 """Circular pockets and rows of holes: G12, G13, G34 to G37.1."""
@@ -203,10 +203,10 @@ MITSUBISHI = replace(
     scales_named=True,
     offset_group=12,
 )
-"""Mitsubishi mills circles and drills rows of holes by itself, too, and counts the groups of modal codes otherwise."""
+"""Mitsubishi also mills circular pockets and drills patterns on its own, and numbers modal groups otherwise."""
 
 RULES = {"fanuc": FANUC, "haas": HAAS, "mitsubishi": MITSUBISHI}
 """By `Dialect.semantics`."""
 
 BACK_BORING = 870
-"""G87 goes in to R, below, and cuts upwards to its depth."""
+"""G87 goes down to R, and cuts upwards to its depth."""

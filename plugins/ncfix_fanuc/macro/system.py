@@ -1,8 +1,8 @@
-"""System variables: what the control lets a program of Macro B read and set.
+"""System variables: variables of the control that a program of Macro B can read and set.
 
-Source: Fanuc 30i operator's manual, "Custom macro", "System variables". What is not listed here exists only on the
-machine: reading it marks the value as known at run time only, setting it is refused from there on, unless it is an
-output or a message.
+Source: Fanuc 30i operator's manual, "Custom macro", "System variables". All other system variables are known only on
+the machine: a value read from one is known at run time only; after one is set, the rest of the program is refused,
+unless it is an output or a message.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ OFFSETS = range(5221, 5327)
 """Work offsets G54 (5221) to G59 (5321), twenty numbers each."""
 
 LENGTHS = range(11001, 12000)
-"""Tool lengths (geometry). What #2001 and #10001 are, lengths or their wear, depends on the kind of offset memory."""
+"""Tool lengths (geometry). Whether #2001 and #10001 are lengths or wear depends on the kind of offset memory."""
 
 SPATIAL = range(3)
 ALARM, ALARM_RAISED = 3000, "NCF216"
@@ -37,7 +37,7 @@ SYSTEM_CODES = {1: 54, 2: 55, 3: 56, 4: 57, 5: 58, 6: 59, 0: 54.1}
 
 
 def positions(control: MacroControl) -> dict[int, Getter]:
-    """End of the block before (5001), machine position (5021), present position (5041), by axis of the machine."""
+    """Variables of positions of each axis: end of the block before (5001), machine (5021), present position (5041)."""
     found: dict[int, Getter] = {}
     for place, index in enumerate(sorted(control.axis_indices)):
         found[5001 + place] = found[5041 + place] = partial(control.coordinate, index)
@@ -46,18 +46,18 @@ def positions(control: MacroControl) -> dict[int, Getter]:
 
 
 def machine_position(control: MacroControl, index: int) -> float:
-    """Where an axis stands in machine coordinates, program units."""
+    """The position of an axis in machine coordinates, program units."""
     control.use_start_positions((index,))
     return control.position[index] / control.unit_of(index)
 
 
 def offsets(control: MacroControl) -> dict[int, Getter]:
-    """Work offsets of X, Y and Z in program units; which number a rotary axis has depends on the machine."""
+    """Variables of the work offsets of X, Y and Z, program units; those of rotary axes depend on the machine."""
     return {number: partial(offset, control, number) for number in OFFSETS if (number - OFFSETS.start) % 20 in SPATIAL}
 
 
 def offset(control: MacroControl, number: int) -> Value:
-    """A work offset; it has to be given."""
+    """The value of a work offset variable, program units; the offset must be given."""
     before_persistent(control, number)
     found = control.parameters.numbers.get(number, 0.0)
     value = nominal(found) / control.modal.unit
@@ -65,7 +65,7 @@ def offset(control: MacroControl, number: int) -> Value:
 
 
 def modes(control: MacroControl) -> dict[int, Getter]:
-    """Codes and words in force: those before the block (4001) and of the running block (4201, 4301)."""
+    """Variables of the codes and words in force: before the block (4001), and of the running block (4201, 4301)."""
     tools = control.tools
     state: dict[int, Getter] = {
         1: lambda: control.modal.motion / 10,
@@ -86,12 +86,12 @@ def modes(control: MacroControl) -> dict[int, Getter]:
 
 
 def is_harmless(number: int) -> bool:
-    """Whether it moves nothing and changes no coordinates when a variable is set."""
+    """Whether setting a variable moves nothing and changes no coordinates."""
     return not is_system(number) or any(number in each for each in HARMLESS)
 
 
 def was_set(control: MacroControl, number: int, value: Value) -> None:
-    """The program has set a variable of the control."""
+    """Apply the effect of setting a variable of the control."""
     if number == ALARM:
         raise Fault(ALARM_RAISED, "the program raises an alarm here (#3000)", "the control stops")
     system, place = divmod(number - OFFSETS.start, 20)

@@ -1,15 +1,14 @@
-"""Tilted working planes: G68.2 sets a frame in the workpiece, G53.1 turns the tool square to it, G69 ends it. And the
-direction of the tool as a vector, I J K under G43.5.
+"""Tilted working planes (G68.2 begins one, G53.1 turns the tool square to it, G69 ends it), and tool vectors (G43.5).
 
-X Y Z are then those of the tool tip in a frame that turns with the workpiece, whatever the rotary axes do: the control
-computes the linear axes from the tip as it does under tool-centre-point control.
+In a tilted plane, X Y Z are those of the tool tip in a frame that turns with the workpiece, whatever the rotary axes
+do: the control computes the linear axes from the tip, as under tool-centre-point control.
 The dynamic work offset of Haas (G254, G255) turns the work offset along with the tables as they stand. X Y Z are then
-those of the tip along the machine's axes, from where the origin of the workpiece has gone: the frame of a tilted plane
-that is square to the tool already.
+those of the tip along the machine's axes, from the turned origin of the workpiece: the frame of a tilted plane to which
+the tool is square already.
 
-The vector of G43.5 points from the tip to the spindle, in the coordinates of the program, and may have any length; a
-component that is not written is zero, and a block without any keeps the direction. Which of two ways the rotary axes
-take is for the control's parameters to say: here it is the nearest.
+The vector I J K of G43.5 points from the tip to the spindle, in the coordinates of the program, and may have any
+length. A component that is not written is zero; a block without any keeps the direction. Parameters of the control
+decide which of two ways the rotary axes take; here it is the nearest.
 Sources: Fanuc 30i operator's manual (machining centre), "Tilted working plane indexing"; Fanuc, "Tool center point
 control for 5-axis machining" (A-79348E), type 2; Mazak, "Inclined-plane machining" (roll, pitch and yaw). That the
 first of three points is the origin, and that the block Q0 shifts it from there, is what programs for these controls say
@@ -62,7 +61,7 @@ CHOICE = "state the direction in smaller steps, or use G43.4, if the control tur
 
 
 def directed(control: MacroControl, block: Block, motion: int) -> str:
-    """Give a block the rotary words that its vector amounts to; why its motion is refused, if it is."""
+    """Add the rotary words to a block that its vector means. Returns why its motion is refused; "" if it is not."""
     axes = control.turning
     if any(block.axes >> index & 1 for index in axes):
         return BY_AXES
@@ -100,7 +99,7 @@ def wanted(control: MacroControl, block: Block) -> list[float]:
 
 
 def note_choice(control: MacroControl, found: Postures) -> None:
-    """Say which way was taken where another would do as well, or where a control may find another one nearer."""
+    """Warn which way was taken if another one is equally possible, or a control may take another as the nearest."""
     if len(found.ways) < 2 or found.at_pole:
         return
     here, (first, second) = found.here, found.ways
@@ -120,10 +119,10 @@ LAST = {POINTS: 3, VECTORS: 2}
 DEFINING = "a tilted plane (G68.2) is begun, and the blocks that say how it lies are not all there"
 BAD_PLANE = "NCF221"
 LEAST = 1e-6
-"""Shorter vectors, and such that have a smaller sine of the angle between them, do not say how a plane lies."""
+"""Least length of vectors, and least sine of the angle between them, that define a plane."""
 
 NEARLY_SQUARE = 2e-3
-"""rad. So far from square two vectors may be that are written with three decimals."""
+"""Largest deviation from a right angle, rad, of two vectors that are written with three decimals."""
 
 NOT_SOLVED = "where the axis {} stands after the tool was turned square to the plane is not known"
 WAY_BY_P = "which way P of {} turns the axis {} is for the control: name the rotary axes behind it"
@@ -140,7 +139,7 @@ TABLES_MOVED = "a rotary axis moves while G254 is in force, which counts from wh
 
 
 def tilt(control: MacroControl, block: Block, code: int) -> None:
-    """G68.2: the frame at X Y Z, turned as its P says; forms that are not followed are refused."""
+    """G68.2: begin a frame at X Y Z, turned as its P says; forms that are not followed are refused."""
     form = whole(block.get("P", EULER), "P of G68.2")
     if control.mirrored or code != TILT or not is_followed(block, form):
         unfollowed(control, block, code)
@@ -160,7 +159,7 @@ def tilt(control: MacroControl, block: Block, code: int) -> None:
 
 
 def is_followed(block: Block, form: int) -> bool:
-    """Whether a block says how the plane lies in a way that is certain."""
+    """Whether a block defines the plane in a form whose meaning is certain."""
     number, turned = whole(block.get("Q", -1.0), "Q of G68.2"), bool(block.get("R"))
     if form == POINTS:
         shifted = any(block.get(letter) for letter in "XYZ")
@@ -177,7 +176,7 @@ def order_of(block: Block) -> str:
 
 
 def define(control: MacroControl, block: Block, form: int) -> None:
-    """One of the blocks that give three points (Q1 to Q3, turned by R of Q0), or vectors along X and Z (Q1, Q2)."""
+    """Apply one of the blocks that define a plane: three points (Q1 to Q3, turned by R of Q0), or vectors (Q1, Q2)."""
     number = whole(block.get("Q"), "Q of G68.2")
     if form != control.defining or number == 0 or number in control.definition:
         control.defining, control.definition = form, {}
@@ -210,7 +209,7 @@ def components(block: Block, letters: str) -> Triple:
 
 
 def begin(control: MacroControl, rotation: Rotation, origin: Block) -> None:
-    """Into the tilted plane whose origin a block names."""
+    """Begin the tilted plane whose origin a block names."""
     end(control)
     feature = shifted({index: control.modal.unit * origin.get(LETTERS[index]) for index in (X, Y, Z)})
     control.frames = replace(control.frames, plane=replace(feature, rotation=rotation), rotation=WORLD)
@@ -220,7 +219,7 @@ def begin(control: MacroControl, rotation: Rotation, origin: Block) -> None:
 
 
 def rotate(control: MacroControl, block: Block, code: int) -> None:
-    """G68 and G69; G68 with I J K turns in space and is not followed, nor is any in mirrored coordinates."""
+    """G68 and G69. G68 with I J K (a rotation in space), and any in mirrored coordinates, is not followed."""
     if control.mirrored:
         unfollowed(control, block, CANCEL if code == CANCEL else TILT)
         return
@@ -235,7 +234,7 @@ def rotate(control: MacroControl, block: Block, code: int) -> None:
 
 
 def end(control: MacroControl) -> None:
-    """Out of the tilted plane."""
+    """End the tilted plane, if there is one."""
     if not control.tilted:
         return
     control.tilted, control.frame_unknown = False, None
@@ -250,10 +249,10 @@ def end(control: MacroControl) -> None:
 
 
 def align(control: MacroControl, block: Block, code: int) -> None:
-    """The rotary axes turn so that the tool stands square to the plane.
+    """G53.1 and G53.6: turn the rotary axes so that the tool is square to the plane.
 
-    In G53.1 the linear axes stand still; in G53.6 they follow, so that the tip stays where it is on the workpiece. On
-    some controls P chooses among several ways (Mitsubishi, Mazak): then nobody knows where the axes stand.
+    In G53.1 the linear axes stand still; in G53.6 they follow, so that the tip stays at its place on the workpiece. On
+    some controls P chooses among several ways (Mitsubishi, Mazak); then the positions of the axes are not known.
     """
     control.use_start_positions(control.turning)
     found = control.postures(normal_of(control.rotation))
@@ -279,7 +278,7 @@ def align(control: MacroControl, block: Block, code: int) -> None:
 
 
 def turned(control: MacroControl, angles: Mapping[int, float], *, about_tip: bool) -> Vector:
-    """The command with the rotary axes at some angles: the tip stays where it is, or X Y Z of the machine do."""
+    """The command with the rotary axes at these angles; `about_tip`: the tip stays, else X Y Z of the machine stay."""
     if about_tip:
         return [angles.get(index, value) for index, value in enumerate(control.position)]
     assert control.kinematics is not None, "they have shown how the tool is pointed"
@@ -293,7 +292,7 @@ def turned(control: MacroControl, angles: Mapping[int, float], *, about_tip: boo
 
 
 def is_moved_otherwise(control: MacroControl, block: Block) -> bool:
-    """Whether G53.6 leads the tip elsewhere: along the tool (R), or with no length in force, or with another one."""
+    """Whether G53.6 moves the tip: along the tool (R), or because no tool length, or another one, is in force."""
     other = "H" in block.values and whole(block.values["H"], "H") != control.tools.offset
     return bool(block.get("R")) or not control.length_code or other
 
@@ -302,7 +301,7 @@ def is_moved_otherwise(control: MacroControl, block: Block) -> bool:
 
 
 def dynamic_offset(control: MacroControl, block: Block, code: int) -> None:
-    """G254 and G255."""
+    """G254 and G255 of Haas: begin and end the dynamic work offset."""
     control.resume(DYNAMIC)
     if code == DYNAMIC_OFF:
         control.dynamic = False
@@ -321,5 +320,5 @@ def dynamic_offset(control: MacroControl, block: Block, code: int) -> None:
 
 
 def turns_tables(control: MacroControl, block: Block) -> bool:
-    """Whether a block has a word of a rotary axis that would turn the tables under the offset."""
+    """Whether a block has a rotary word while the dynamic work offset is in force, which would turn the tables."""
     return control.dynamic and any(block.axes >> index & 1 for index in control.turning)

@@ -1,8 +1,8 @@
-"""The variables of Macro B, local to a call level, common, and those that the control keeps; and its expressions.
+"""The variables of Macro B (local to a call level, common, and those of the control), and its expressions.
 
-A variable that was never set is vacant, and NaN stands for that here: copied as it is, zero in arithmetic, and equal
-to nothing but another vacant one. What exists only at run time is `Unknown`, as in RS274; so is the machine's position:
-compensation changes what a program reads there, so nothing that is computed from it can be corrected.
+A variable that was never set is vacant, represented by NaN: it is copied unchanged, is zero in arithmetic, and equals
+only another vacant one. A value that is known only at run time is `Unknown`, as in RS274. So is the machine's position:
+compensation changes the value that a program reads, so nothing computed from it can be corrected.
 Source: Fanuc 30i operator's manual, "Custom macro", "Variables", "System variables" and "Arithmetic and logic
 operation".
 """
@@ -35,7 +35,7 @@ VACANT = math.nan
 """The value of a variable that has none."""
 
 NEARLY = 1e-8
-"""Numbers that differ by less, relative to their size, may be equal to a control with other rounding."""
+"""Relative difference below which two numbers may be equal on a control with other rounding."""
 
 ROUNDED = frozenset("XYZABCUVWIJKRQ")
 """Addresses in which ROUND works to the least increment."""
@@ -47,12 +47,12 @@ def number(value: float) -> float:
 
 
 def is_vacant(value: Value) -> bool:
-    """Whether a value is that of a vacant variable."""
+    """Whether a value is vacant."""
     return math.isnan(nominal(value))
 
 
 def variable_number(value: float) -> int:
-    """The number of a variable."""
+    """The number of a variable given by a value; raises `Fault` if it is not whole."""
     index = number(value)
     if abs(index - round(index)) > 0.001:
         raise Fault(ARITHMETIC, f"the number of a variable is {value:g}, and must be a whole number")
@@ -60,7 +60,7 @@ def variable_number(value: float) -> int:
 
 
 def whole_number(value: float) -> int:
-    """The whole number that a bit operation works on."""
+    """The operand of a bit operation: the value rounded to a whole number."""
     return math.floor(value + 0.5)
 
 
@@ -130,7 +130,7 @@ class MacroExpressions(Expressions):
         return number(value)
 
     def numbered(self, index: Evaluate) -> Evaluate:
-        """`#1`, `#[...]`; which one may itself be unknown."""
+        """`#1`, `#[...]`; the number of the variable may itself be unknown."""
 
         def evaluate(scope: object) -> Value:
             which = index(scope)
@@ -140,7 +140,7 @@ class MacroExpressions(Expressions):
         return evaluate
 
     def function(self, name: str, arguments: tuple[Evaluate, ...], address: str = "") -> Evaluate:
-        """A sign leaves a vacant value vacant; in an address ROUND rounds to the least increment."""
+        """A function or a sign; both keep a vacant value vacant. ROUND in an address rounds to the least increment."""
         (operand,) = arguments
         if name in "+-":
             sign = -1.0 if name == "-" else 1.0
@@ -155,7 +155,7 @@ class MacroExpressions(Expressions):
         return to_increments
 
     def operator(self, operator: str, left: Expression, right: Expression, address: str = "") -> Evaluate:
-        """As everywhere; where rounding decides a relation, it is unknown."""
+        """An operator; a relation is unknown if rounding may decide it."""
         relation = RELATIONS.get(operator)
         if relation is None:
             return super().operator(operator, left, right, address)
@@ -180,11 +180,11 @@ LOCAL = range(1, 34)
 """#1 to #33 belong to the call level."""
 
 LASTING = (range(400, 1000), range(900_000, 907_400))
-"""Common variables that other programs find as this one has left them; #400 and #900000 on are Mitsubishi's."""
+"""Common variables that keep their values for other programs; those from #400 and #900000 on are Mitsubishi's."""
 
 COMMON = (range(100, 200), *LASTING, range(98000, 98500))
 LAST = 149_999
-"""The control's own variables end here."""
+"""The largest number of a variable of the control."""
 
 POSITIONS = (range(5001, 5021), range(5021, 5041), range(5041, 5061))
 """End of the block before, machine position, present position."""
@@ -192,11 +192,11 @@ POSITIONS = (range(5001, 5021), range(5021, 5041), range(5041, 5061))
 
 @mutable
 class MacroVariables(NumberedParameters):
-    """All variables.
+    """All variables of a program.
 
-    scopes    the local variables of each call level, the main program's first
-    position  called when the program reads where the machine stands
-    inherits  the program is called by another one: so are its local variables set
+    scopes    local variables of each call level, the main program's first
+    position  called with the number of a variable when the program reads a position of the machine
+    inherits  the program is called by another one, which sets its local variables
     """
 
     position: Callable[[int], None] = lambda index: None
@@ -216,7 +216,7 @@ class MacroVariables(NumberedParameters):
         return store.get(index, Unknown(f"#{index}") if is_system(index) else VACANT)
 
     def from_control(self, index: int) -> Value:
-        """A value that the control computes; a position is not what it will be when the program is corrected."""
+        """A value that the control computes; a position is `Unknown`, because a correction changes it."""
         self.changes += 1
         value = self.live[index]()
         if any(index in positions for positions in POSITIONS):
@@ -225,7 +225,7 @@ class MacroVariables(NumberedParameters):
         return value
 
     def store_of(self, index: Key) -> Store:
-        """Where a variable is kept."""
+        """The store that holds a variable."""
         return self.scopes[-1] if index in LOCAL else self.numbers
 
     def check_writable(self, key: Key) -> None:
@@ -244,12 +244,12 @@ def is_common(index: int) -> bool:
 
 
 def is_lasting(index: int) -> bool:
-    """Whether other programs find a variable as this one has left it."""
+    """Whether a variable keeps its value for other programs."""
     return any(index in numbers for numbers in LASTING)
 
 
 def exists(index: int) -> bool:
-    """Whether some control of the family has a variable."""
+    """Whether a control of the family may have a variable with this number."""
     return 0 < index <= LAST or is_common(index)
 
 
