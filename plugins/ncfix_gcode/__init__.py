@@ -1,4 +1,4 @@
-"""Rewritten programs as "tables", on any control: the control `gcode`."""
+"""The control `gcode`: rewritten programs in the role of tables, for any control."""
 
 from __future__ import annotations
 
@@ -14,5 +14,5 @@ if TYPE_CHECKING:
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
-    """Bring the control `gcode`: programs that are rewritten."""
+    """Register the control `gcode`."""
     register(made_by("ncfix_gcode.control:Gcode"), name="gcode")

@@ -1,7 +1,7 @@
-"""The rewritten program as "table": what `ncfix fix` does, on any control, so that one report compares it with tables.
+"""Rewritten programs in the role of tables: `ncfix fix` for any control, so that one report compares it with tables.
 
-The folder holds the machine file and how programs are rewritten; `ncfix emulate gcode DIR --program P` rewrites P with
-them. At a pose, the correction is that of the strategy, on the digits that the control resolves.
+The folder contains the machine file and the way programs are rewritten; `ncfix emulate gcode DIR --program P` rewrites
+P with them. The correction at a pose is that of the strategy, rounded to the control's least increments.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ MACHINE, HOW = "machine.toml", "fix.toml"
 
 @frozen
 class Rewriting:
-    """What the programs of a machine are corrected by; there are no tables in it."""
+    """The correction of a machine's programs, with the interface of tables."""
 
     machine: Machine
     strategy: Strategy
@@ -46,12 +46,12 @@ class Rewriting:
     length: float = 0.0
 
     def for_tool(self, length: float) -> Rewriting:
-        """With a tool of this length: a program says which one it uses."""
+        """The same for a tool of this length; a program states which tool it uses."""
         return Rewriting(self.machine, self.strategy, self.tolerance_um, length)
 
     @property
     def grids(self) -> tuple[Grid, ...]:
-        """None."""
+        """No grids."""
         return ()
 
     @property
@@ -61,11 +61,11 @@ class Rewriting:
 
     @property
     def points(self) -> int:
-        """None."""
+        """Zero: there are no nodes."""
         return 0
 
     def at(self, names: Sequence[str], q: Array, direction: Array | None = None) -> Array:
-        """See `Tables.at`: what the words of the rewritten block add to those of the original."""
+        """See `Tables.at`: the change of the axis words in the rewritten block."""
         columns = [names.index(name) for name in self.machine.axis_names]
         meant = q[:, columns]
         state = State(self.length, 0.0 if direction is None else direction[:, columns])
@@ -111,7 +111,7 @@ class Gcode(FileControl):
     switch_off = "Run the original program."
 
     def write(self, request: Request) -> Written:
-        """The machine file, and how programs are rewritten."""
+        """The machine file, and a file on how programs are rewritten."""
         settings = self.settings(request.settings)
         strategy = get_strategy(settings["strategy"])
         tolerance = _tolerance(settings["tolerance_um"])
@@ -119,11 +119,11 @@ class Gcode(FileControl):
         return Written({MACHINE: dumps(request.machine).encode(), HOW: how.encode()}, (strategy.leaves,))
 
     def reached(self, machine: Machine, tables: Tables) -> str:
-        """Of rotary axes only where there are some; an orientation that only they could put right, too."""
+        """The class reached; R-VOL only if the machine has rotary axes."""
         return self.reaches if machine.rotary.any() else "L-VOL"
 
     def examined(self, files: Files) -> tuple[Rewriting | None, list[Remarks]]:
-        """How programs are rewritten."""
+        """The rewriting that the files describe."""
         remarks = Remarks.of(HOW, files.get(HOW, b""))
         try:
             how = tomllib.loads(files.get(HOW, b"").decode())

@@ -14,5 +14,5 @@ if TYPE_CHECKING:
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
-    """Bring the control `isg`: VOLCOMP configuration and grid."""
+    """Register the control `isg`: VOLCOMP configuration and grids."""
     register(made_by("ncfix_isg.control:Isg"), name="isg")

@@ -1,10 +1,10 @@
 """VOLCOMP of the ISG kernel and Beckhoff TwinCAT CNC (TF5280): a configuration list and grids in ISG_CSV.
 
-Grids hold the error of each linear axis over the axes that matter, rotary ones too, so that the kinematic model of the
-control is not needed: with `workpiece_axes 0` and no angles the control takes EXX, EXY and EXZ off the command of X,
-and so on. What the grids say together is therefore ncfix's exact correction with the opposite sign. Over more than
-three axes one grid takes more nodes than are worth it; then each linear axis has up to three grids, over fewer axes
-each. Play, of which grids know nothing, goes into the leadscrew compensation of the axes.
+Grids contain the error of each linear axis over all axes that matter, including rotary ones, so that the control's
+kinematic model is not needed: with `workpiece_axes 0` and no angles the control subtracts EXX, EXY and EXZ from the
+command of X, and so on. The sum of all grids is therefore ncfix's exact correction with the opposite sign. For more
+than three axes a single grid would need too many nodes; then each linear axis has up to three grids over fewer axes.
+Grids cannot represent play, which goes into the leadscrew compensation of the axes.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ AXES = SettingForm(
     "axes of X, Y and Z, each once", lambda text: sorted(text.upper()) == sorted({*text.upper()} & {*LINEAR})
 )
 ONE = 3
-"""Up to so many inputs a single grid does."""
+"""Largest number of inputs for which a single grid is used."""
 
 
 class Isg(FileControl):
@@ -170,7 +170,7 @@ class Isg(FileControl):
     )
 
     def write(self, request: Request) -> Written:
-        """`volcomp.lis` and the grids over the axes that matter."""
+        """`volcomp.lis` and the grids over the axes that matter; leadscrew lists for play."""
         settings = self.settings(request.settings)
         most = int(settings["points"])
         filter_steps = int(settings["filter_steps"])
@@ -194,7 +194,7 @@ class Isg(FileControl):
         return Written(files, tuple(_notes(made, request, play)))
 
     def examined(self, files: Files) -> tuple[Compensation, list[Remarks]]:
-        """Grids, some turned round, and play."""
+        """The grids, with the signs of the configuration applied, and play."""
         listed, config = read_configuration(files)
         grids, remarks = read_grids(listed.files, listed.numbers, files)
         play, more = read_leadscrews(files, listed.numbers)
@@ -202,11 +202,11 @@ class Isg(FileControl):
         return Compensation((*(Term((grid,)) for grid in turned), *play)), [config, *remarks, *more]
 
     def knows(self, name: str, content: bytes) -> bool:
-        """A list of VOLCOMP or of a leadscrew, or a table whose head names positions, then errors."""
+        """Whether a file is a list of VOLCOMP or of a leadscrew, or a table whose header has positions, then errors."""
         return SCREW_MARK in content or is_list(content) or is_grid(content)
 
     def look(self, files: Files) -> tuple[Message, ...]:
-        """See `Control`; grids and lists of axes by themselves if no list of VOLCOMP names them."""
+        """See `Control`; without a list of VOLCOMP, grids and axis lists are examined by themselves."""
         if any(is_list(content) for content in files.values()):
             return self.lint(files)
         grids = sorted(name for name, content in files.items() if is_grid(content))
@@ -216,7 +216,7 @@ class Isg(FileControl):
 
 @frozen
 class GridSet:
-    """Grids, with the axis whose error the parameters of each are called, and what they miss together, mm."""
+    """Grids, the axis after which each one's parameters are named, and the largest error that all leave, mm."""
 
     grids: tuple[Grid, ...]
     owners: tuple[str, ...]
@@ -236,7 +236,7 @@ def _grid_set(volume: Volume, target: float, most: int, how: str) -> GridSet:
 
 
 def _times(grid: Grid, factors: Mapping[str, float]) -> Grid:
-    """A grid as the control takes it that turns some of its axes round, or leaves them."""
+    """The grid with the values of each output axis multiplied by its factor: -1 if reversed, 0 if switched off."""
     return replace(grid, values=grid.values * [factors.get(name, 1.0) for name in grid.outputs])
 
 

@@ -1,13 +1,12 @@
-"""The files of the ISG kernel: the configuration list of VOLCOMP, grids as ISG_CSV, and leadscrew lists of single axes.
+"""Files of the ISG kernel: the configuration list of VOLCOMP, grids in ISG_CSV, and leadscrew lists of single axes.
 
-The configuration list has a name and a value a line. A grid has a row for every combination of positions.
+The configuration list has a name and a value per line. A grid has a row for every combination of positions.
 
-Play goes into the leadscrew compensation of single axes (`kw.ssfk`), one axis list for each axis that has some: what
-VOLCOMP holds does not know the way an axis moves. The leadscrew compensation does, if it is bilateral: TF5200
-documentation, whose own example says that values are actual position less setpoint, that is errors, in tenths of a
-micrometre, with straight lines between them and the end values beyond. It changes the setpoint, and so does VOLCOMP.
-Positions are listed one by one, or `interval` apart from `kw_startpos` on; a list that is not bilateral has the values
-`pos` for both ways.
+Play is written to the leadscrew compensation (`kw.ssfk`), one axis list for each axis with play, because VOLCOMP does
+not depend on the direction of motion. The leadscrew compensation does if it is bilateral. By its own example in the
+TF5200 documentation, values are actual position minus setpoint, that is errors, in tenths of a micrometre, linear
+between points and constant beyond them. It changes the setpoint, and so does VOLCOMP. Positions are listed one by one,
+or `interval` apart from `kw_startpos` on; a list that is not bilateral uses the values `pos` for both directions.
 """
 
 from __future__ import annotations
@@ -37,34 +36,34 @@ MOST_FILES = 10
 LIST = re.compile(rb"(?im)^[ \t]*(?:workpiece_axes|file(?:_format)?\[\d+\])[ \t]")
 Entries = dict[str, tuple[int, str]]
 FACTORS = {"negate": -1.0, "set_to_zero": 0.0}
-"""Entries that name linear axes, as in `negate XY`, and by what their compensation is multiplied."""
+"""Entries that name linear axes, such as `negate XY`, and the factor of their compensation."""
 OTHERS = {"diagnosis_file": "", "use_axis_offsets": "0"}
-"""Entries that may be there, and the value that they must have, if any."""
+"""Optional entries, and the value that each must have, if any."""
 SPELT = {name.lower(): name for name in (*HEAD, *TAIL, *FACTORS, *OTHERS)}
-"""The control does not tell small letters from large ones."""
+"""Lower-case name -> name as documented, because the control ignores case."""
 TRUTH = {"1": "TRUE", "0": "FALSE"}
 PARAMETER = re.compile(r"E[XYZABC]0?[XYZABC]")
 POSITION = re.compile(r"E([XYZ])([XYZABC])")
 HEAD_LINES = 100
-"""Among which the names are looked for."""
+"""Number of lines among which the header is searched."""
 LARGE = 1.0
-"""mm: no machine is that wrong; most likely the unit is."""
+"""Largest plausible error, mm; a larger one probably has a wrong unit."""
 STEEP = 0.01
-"""mm per mm or degree."""
+"""Largest plausible slope of an error, mm per mm or degree."""
 Words = tuple[int, list[str]]
 SCREW_UNIT = 1e-4
-"""mm: of positions and values."""
+"""Unit of positions and values, mm."""
 MOST_SCREW_POINTS = 1500
-"""Points of a table (P-COMP-00059)."""
+"""Largest number of points of a table (P-COMP-00059)."""
 SCREW_MARK = b"kw.ssfk"
-"""What tells these lists from that of VOLCOMP."""
+"""Text by which these lists are distinguished from that of VOLCOMP."""
 SCREW_FILE = "leadscrew_{}.lis"
 SCREW_HEAD = {"unit": ("", ("1",)), "bilateral": ("0", ("0", "1")), "modulo": ("0", ("0",))}
-"""Entry -> its default, and what can be read. No text says which unit is meant if none is given."""
+"""Entry -> its default, and the values that can be read. The documentation gives no default for the unit."""
 INCREMENTS = "0"
-"""A unit that ncfix cannot run."""
+"""Value of `unit` that ncfix cannot run."""
 LARGE_SCREW = 10_000
-"""1 mm: no machine has so much."""
+"""Largest plausible value, 1 mm."""
 SCREW_POINT = re.compile(r"kw\.ssfk\.table\[(\d{1,6})\]\.(setpoint|pos|neg)")
 NOTE = re.compile(r"/\*.*?\*/|#.*")
 LETTER = re.compile(r"[A-Za-z](?:[ _-].*)?")
@@ -74,7 +73,7 @@ WHOLE = re.compile(r"[-+]?\d{1,12}")
 def config_text(
     numbers: Mapping[str, int], folder: str, names: Sequence[str], filter_steps: int, negate: str = ""
 ) -> bytes:
-    """The list: axis numbers, switches, and the files; negate: the axes whose compensation the control turns round."""
+    """The list: axis numbers, switches, and files; negate: axes whose compensation the control reverses."""
     joint = "" if folder.endswith(("\\", "/")) else "\\"
     entries = {
         **HEAD,
@@ -90,9 +89,9 @@ def config_text(
 
 @frozen
 class Configuration:
-    """What the list says: the grid files in their order, the logical number of each axis, and what is turned round.
+    """The content of the list: grid files in order, the logical number of each axis, and factors.
 
-    factors  linear axis -> -1 where `negate` names it, 0 where `set_to_zero` does (P-VOLC-00009 and what follows it)
+    factors  linear axis -> -1 if named by `negate`, 0 if named by `set_to_zero` (P-VOLC-00009 and following)
     """
 
     files: tuple[str, ...] = ()
@@ -101,12 +100,12 @@ class Configuration:
 
 
 def is_list(content: bytes) -> bool:
-    """Whether a file is the list of VOLCOMP: it names files of grids, or how axes lie."""
+    """Whether a file is the list of VOLCOMP: it names grid files, or the position of axes."""
     return LIST.search(content) is not None and SCREW_MARK not in content
 
 
 def read_configuration(files: Files) -> tuple[Configuration, Remarks]:
-    """The list, and remarks on it; lists of single axes are none of its business."""
+    """The list of VOLCOMP, with remarks on it; lists of single axes are ignored."""
     lists = [name for name, content in files.items() if name.lower().endswith(".lis") and SCREW_MARK not in content]
     path = lists[0] if len(lists) == 1 else "volcomp.lis"
     remarks = Remarks.of(path, files[path] if len(lists) == 1 else b"", "#")
@@ -125,7 +124,7 @@ def read_configuration(files: Files) -> tuple[Configuration, Remarks]:
 def _entries(
     remarks: Remarks, spelt: Callable[[str], str] = str, known: Callable[[str], bool] = lambda name: True
 ) -> Entries:
-    """The entries of a list by name, without its notes, `# ...` and `/* ... */`."""
+    """Name -> entry of a list, without its comments, `# ...` and `/* ... */`."""
     found: Entries = {}
     for number, row in enumerate(remarks.rows, 1):
         words = NOTE.sub("", row).split(None, 1)
@@ -142,7 +141,7 @@ def _entries(
 
 
 def _spelt(name: str) -> str:
-    """A name as the documentation has it."""
+    """A name as spelled in the documentation."""
     if len(name) == 1:
         return name.upper()
     return SPELT.get(name.lower(), name.lower() if name.lower().startswith("file") else name)
@@ -191,7 +190,7 @@ def _check_axes(entries: Entries, axes: list[str], remarks: Remarks) -> None:
 
 
 def _grid_files(entries: Entries, remarks: Remarks, files: Files) -> list[str]:
-    """The names in `files` of the grids that are listed, in their order."""
+    """Names, as in `files`, of the listed grids in their order."""
     found = []
     for index in range(MOST_FILES):
         line, path = entries.get(f"file[{index}]", (0, ""))
@@ -212,7 +211,7 @@ def _grid_files(entries: Entries, remarks: Remarks, files: Files) -> list[str]:
 
 
 def _check_listing(entries: Entries, remarks: Remarks, count: int) -> None:
-    """Files are numbered from 0 without a gap, and there is one at least."""
+    """Check that files are numbered from 0 without a gap, and that there is at least one."""
     known = {f"{key}[{index}]" for index in range(count) for key in ("file", "file_format")}
     stray = next((name for name in entries if name.startswith("file") and name not in known), None)
     if stray is not None:
@@ -223,12 +222,12 @@ def _check_listing(entries: Entries, remarks: Remarks, count: int) -> None:
 
 
 def parameters(grid: Grid, owner: str = "") -> list[str]:
-    """The names of its values: errors in the directions of its outputs, of an axis or each of its own."""
+    """The names of a grid's values: errors along its outputs, of the axis `owner`, or each of its own axis."""
     return [f"E{name}{owner or name}" for name in grid.outputs]
 
 
 def grid_text(grid: Grid, owner: str = "") -> bytes:
-    """The file of a grid of corrections: errors, that is the opposite, in mm; positions in mm and degree."""
+    """The file of a grid of corrections: errors (the opposite sign) in mm; positions in mm and degree."""
     units = [unit_of(name) for name in grid.inputs]
     lines = [nodes / unit for nodes, unit in zip(grid.nodes, units, strict=True)]
     values = np.round(-grid.values.reshape(-1, len(grid.outputs)), 6) + 0.0
@@ -250,7 +249,7 @@ def is_grid(content: bytes) -> bool:
 
 
 def read_grids(names: Sequence[str], axes: Collection[str], files: Files) -> tuple[list[Grid], list[Remarks]]:
-    """The grids of corrections in these files, with remarks on each; axes: that may be arguments."""
+    """The grids of corrections in these files, with remarks on each file; axes: letters allowed as inputs."""
     grids: list[Grid] = []
     remarks = []
     seen: dict[str, str] = {}
@@ -271,7 +270,7 @@ def read_grids(names: Sequence[str], axes: Collection[str], files: Files) -> tup
 
 
 def _parts(rows: Sequence[str]) -> list[list[Words]]:
-    """The lines of each table, as words, without comments; a line that begins with # stands between two tables."""
+    """The lines of each table, split into words, without comments; a line that begins with # separates two tables."""
     parts: list[list[Words]] = [[]]
     for number, row in enumerate(rows, 1):
         if row.lstrip().startswith("#"):
@@ -323,7 +322,7 @@ def _numbers(remarks: Remarks, rows: Sequence[tuple[int, list[str]]], width: int
 def _grids(
     remarks: Remarks, lines: Sequence[int], inputs: Sequence[str], outputs: Sequence[str], table: Array
 ) -> list[Grid]:
-    """One grid for each direction that the parameters are in, if the rows fill a regular grid."""
+    """One grid for all outputs, if the rows form a regular grid; errors in the same direction are added."""
     places, values = table[:, : len(inputs)], table[:, len(inputs) :]
     nodes = [np.unique(column) for column in places.T]
     counts = tuple(len(line) for line in nodes)
@@ -352,7 +351,7 @@ def _grids(
 
 
 def _look_for_jumps(remarks: Remarks, nodes: Sequence[Array], values: Array) -> None:
-    """Name the input along which neighbours differ by more than a machine can."""
+    """Remark on an input along which neighbouring values differ by more than is plausible."""
     for axis, line in enumerate(nodes):
         if len(line) > 1:
             steps = np.diff(line).reshape([-1 if i == axis else 1 for i in range(values.ndim)])
@@ -362,7 +361,7 @@ def _look_for_jumps(remarks: Remarks, nodes: Sequence[Array], values: Array) -> 
 
 
 def list_text(reversal: Reversal, number: int) -> bytes:
-    """The axis list: errors one way and the other, at the same positions."""
+    """The axis list: errors for both directions at the same positions."""
     places = np.rint(reversal.nodes / SCREW_UNIT).astype(np.int64).tolist()
     errors = np.rint(-reversal.half / SCREW_UNIT).astype(np.int64).tolist()
     entries: dict[str, object] = {"kopf.achs_nr": number, "kopf.log_achs_name": reversal.axis}
@@ -375,7 +374,7 @@ def list_text(reversal: Reversal, number: int) -> bytes:
 
 
 def read_leadscrews(files: Files, numbers: Mapping[str, str] | None) -> tuple[list[Term], list[Remarks]]:
-    """What the axis lists among the files do, with remarks on each.
+    """The effect of the axis lists among the files, with remarks on each.
 
     numbers: axis -> number in VOLCOMP's list; None if there is none.
     """
@@ -413,7 +412,7 @@ def _terms(remarks: Remarks, numbers: Mapping[str, str] | None) -> Iterator[Term
 
 
 def _axis(remarks: Remarks, entries: Entries, numbers: Mapping[str, str] | None) -> str:
-    """The letter of the axis: the name may say more than that, `Y-ACHSE`, and the number decides."""
+    """The letter of the axis; its name may be longer, `Y-ACHSE`. The number must agree with the configuration."""
     line, name = entries.get("kopf.log_achs_name", (0, ""))
     axis = name[:1].upper() if LETTER.fullmatch(name) else ""
     if numbers is None:
@@ -427,7 +426,7 @@ def _axis(remarks: Remarks, entries: Entries, numbers: Mapping[str, str] | None)
 
 
 def _even(remarks: Remarks, entries: Entries, points: dict[int, dict[str, int]]) -> None:
-    """Give points that are an interval apart their positions."""
+    """Give points without setpoints their positions from start and interval."""
     line, interval = entries.get("kw.ssfk.interval", (0, "0"))
     start_line, start = entries.get("kw.ssfk.kw_startpos", (0, "0"))
     if not interval.isdecimal():

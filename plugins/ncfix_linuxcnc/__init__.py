@@ -44,11 +44,11 @@ LINUXCNC = Dialect(
 
 @hookimpl
 def register_dialects(register: Register[Dialect]) -> None:
-    """Bring the dialect `linuxcnc`."""
+    """Register the dialect `linuxcnc`."""
     register(LINUXCNC)
 
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
-    """Bring the control `linuxcnc`: `.comp` files."""
+    """Register the control `linuxcnc` (`.comp` files)."""
     register(made_by("ncfix_linuxcnc.control:LinuxCnc"), name="linuxcnc")

@@ -1,8 +1,8 @@
-"""LinuxCNC's screw compensation: one `.comp` file for each joint, and the lines of the ini file that load them.
+"""LinuxCNC screw compensation: one `.comp` file for each joint, and the lines of the ini file that load them.
 
-The rules are those of LinuxCNC's source (usrmotintf.cc, command.c, control.c): a correction that is added to the motor
-position, looked up by the joint's own commanded position, forward or reverse by the way it moves, linear between the
-points and held beyond them.
+The rules are those of LinuxCNC's source (usrmotintf.cc, command.c, control.c): a correction is added to the motor
+position. It is looked up by the joint's own commanded position, forward or reverse by its direction of motion, linear
+between points and constant beyond them.
 """
 
 from __future__ import annotations
@@ -41,28 +41,28 @@ from ncfix.tables.table_files import ALONE, DEGREE, NUMBER, ORDER, TURNING
 from ncfix.values import frozen
 
 MOST = 256
-"""EMCMOT_COMP_SIZE of LinuxCNC."""
+"""Largest number of points: EMCMOT_COMP_SIZE of LinuxCNC."""
 LONGEST = 255
-"""Characters of a line that its reader takes."""
+"""Largest number of characters of a line that LinuxCNC's reader accepts."""
 STEEP = 0.01
-"""Change of a correction per length from which it looks like a slip: real screws stay below a thousandth."""
+"""Slope of a correction above which it looks like a typing error; real screws stay below a thousandth."""
 LARGE = 1.0
-"""mm, degree: no machine is that wrong."""
+"""Largest plausible correction, mm or degree."""
 GAP = r"(?:\s+|(?=[-+]))"
-"""What sscanf takes between two numbers."""
+"""Separator of two numbers as sscanf accepts it."""
 TRIPLE = re.compile(rf"\s*({NUMBER}){GAP}({NUMBER}){GAP}({NUMBER})(.*)")
 SECTION = re.compile(r"\s*\[(\w+)\]\s*")
 ENTRY = re.compile(r"\s*(\w+)\s*=\s*(.*?)\s*")
 UNITS = {"mm": 1.0, "metric": 1.0, "inch": 25.4, "in": 25.4, "imperial": 25.4}
 DECIMALS = {"mm": 6, "inch": 7}
-"""Of a file of that unit: a nanometre, and less than three."""
+"""Decimals in a file of that unit: one nanometre, and less than three."""
 LOADS = re.compile(rb"(?im)^[ \t]*COMP_FILE[ \t]*=")
 Entries = dict[str, tuple[int, str]]
 
 
 @frozen
 class JointTable:
-    """One table: corrections (added) over the position of a joint, in mm or degree, (n,) each."""
+    """The table of a joint: corrections (added) over its position, in mm or degree, (n,) each."""
 
     number: int
     axis: str
@@ -76,13 +76,13 @@ class JointTable:
         return f"joint_{self.number}_{self.axis}.comp"
 
     def terms(self) -> tuple[Term, Term]:
-        """The two columns as tables, mm or rad."""
+        """The forward and reverse columns as terms, mm or rad."""
         unit = unit_of(self.axis)
         return own_terms(self.axis, self.nodes * unit, self.forward * unit, self.reverse * unit)
 
 
 def comp_text(joint: JointTable, kind: int, unit: str = "mm") -> bytes:
-    """A `.comp` file: nominal, forward, reverse. No comments: LinuxCNC stops reading where a line has another form."""
+    """A `.comp` file: nominal, forward, reverse. No comments: LinuxCNC stops reading at any line of another form."""
     columns = [joint.nodes, joint.forward, joint.reverse]
     if kind == 0:
         columns = [joint.nodes, joint.nodes - joint.forward, joint.nodes - joint.reverse]
@@ -101,7 +101,7 @@ def ini_text(joints: list[JointTable], letters: str, kind: int, unit: str = "mm"
 
 
 def read_joints(files: Files) -> tuple[list[JointTable], list[Remarks]]:
-    """The tables that an ini file among these loads, with remarks on every file."""
+    """The tables loaded by the ini file among `files`, with remarks on every file."""
     inis = [name for name in files if name.lower().endswith(".ini")]
     path = inis[0] if len(inis) == 1 else "comp.ini"
     ini = Remarks.of(path, files[path] if len(inis) == 1 else b"", "#")
@@ -128,9 +128,9 @@ def is_ini(content: bytes) -> bool:
 
 
 def is_table(name: str, content: bytes) -> bool:
-    """Whether a file begins as a table does: three numbers, and nothing else, in its first line.
+    """Whether a file looks like a table: its first line has three numbers and nothing else.
 
-    One that is called `.comp` is a table if most of its lines begin with a number: LinuxCNC does not read it all.
+    A `.comp` file is also a table if most of its lines begin with a number, even if LinuxCNC would not read all of it.
     """
     rows = [row for row in content.decode("latin-1").splitlines() if row.strip()]
     match = TRIPLE.fullmatch(rows[0]) if rows else None
@@ -139,7 +139,7 @@ def is_table(name: str, content: bytes) -> bool:
 
 
 def look_at(files: Files) -> list[Remarks]:
-    """Remarks on an ini file with its tables, and on tables that it does not load: of the type with less to say."""
+    """Remarks on ini files with their tables, and on other tables, for the file type that gives fewer remarks."""
     inis = {name: content for name, content in files.items() if is_ini(content)}
     found = [remarks for name in inis for remarks in read_joints({**_others(files, inis), name: inis[name]})[1]]
     loaded = {remarks.path for remarks in found}
@@ -226,7 +226,7 @@ def _table(remarks: Remarks, number: int, axis: str, measured: bool, scale: floa
 
 
 def _too_large(remarks: Remarks, trims: Array, measured: bool, unit: str) -> bool:
-    """Whether the first correction that no machine needs is refused: most likely the file is of the other type."""
+    """Refuse the first implausibly large correction (of a file of the other type?); returns whether there is one."""
     rows = np.flatnonzero(np.abs(trims).max(axis=1) > LARGE)
     if rows.size:
         size = trims[rows[0]][np.abs(trims[rows[0]]).argmax()]
@@ -237,7 +237,7 @@ def _too_large(remarks: Remarks, trims: Array, measured: bool, unit: str) -> boo
 
 
 def _triples(remarks: Remarks) -> Iterator[tuple[float, float, float]]:
-    """The points up to the first line that LinuxCNC's reader stops at."""
+    """The points up to the first line at which LinuxCNC's reader stops."""
     for number, row in enumerate(remarks.rows, 1):
         match = TRIPLE.fullmatch(row)
         if match is None and not any(each.strip() for each in remarks.rows[number - 1 :]):
@@ -260,7 +260,7 @@ def _triples(remarks: Remarks) -> Iterator[tuple[float, float, float]]:
 
 
 def _look_for_jumps(remarks: Remarks, steps: Array, trims: Array) -> None:
-    """Name the points where the correction rises and falls again, or jumps, faster than a screw can err."""
+    """Remark on points where the correction changes faster than the error of a screw can."""
     slopes = np.abs(np.diff(trims, axis=0)).max(axis=1) / steps
     for row in np.flatnonzero(slopes > STEEP):
         text = f"the correction changes by {slopes[row]:.3g} per unit of length from the line before"
@@ -320,7 +320,7 @@ class LinuxCnc(Control):
     switch_off = "Take the COMP_FILE lines out of the ini file and start LinuxCNC again."
 
     def write(self, request: Request) -> Written:
-        """One file for each axis that has something to correct, and `comp.ini`."""
+        """One file for each axis with a correction, and `comp.ini`."""
         settings = self.settings(request.settings)
         kind = settings["type"]
         most = int(settings["points"])
@@ -332,7 +332,7 @@ class LinuxCnc(Control):
         return Written(files, _notes(), least_of_own_axis(request.machine, request.space, request.tool_length))
 
     def read(self, files: Files) -> Compensation:
-        """As LinuxCNC loads them. Raises `ConfigError` NCF491."""
+        """The tables as LinuxCNC loads them. Raises `ConfigError` NCF491."""
         joints, remarks = read_joints(files)
         axes = [joint.axis for joint in joints]
         for axis in {axis for axis in axes if axes.count(axis) > 1}:
@@ -343,16 +343,16 @@ class LinuxCnc(Control):
         return Compensation(tuple(term for joint in joints for term in joint.terms()))
 
     def lint(self, files: Files) -> tuple[Message, ...]:
-        """What would stop LinuxCNC's reader early, and what is rarely meant."""
+        """Remarks on what stops LinuxCNC's reader early, and on unusual values."""
         _, remarks = read_joints(files)
         return messages_of(remarks)
 
     def knows(self, name: str, content: bytes) -> bool:
-        """An ini file that names tables, or a table."""
+        """Whether a file is an ini file that loads tables, or a table."""
         return is_ini(content) or is_table(name, content)
 
     def look(self, files: Files) -> tuple[Message, ...]:
-        """See `Control`; of tables that no ini file loads what is wrong in them under either type."""
+        """See `Control`; tables that no ini file loads are examined as both types."""
         return messages_of(look_at(files))
 
 
