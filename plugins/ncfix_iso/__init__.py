@@ -34,5 +34,5 @@ ISO = Dialect(
 
 @hookimpl
 def register_dialects(register: Register[Dialect]) -> None:
-    """Bring the dialect `iso`."""
+    """Register the dialect `iso`."""
     register(ISO)

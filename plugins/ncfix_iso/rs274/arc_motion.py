@@ -1,4 +1,4 @@
-"""G2 and G3: from the words of a block to an arc in commands."""
+"""G2 and G3: converts the words of a block to an arc in command coordinates."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ncfix_iso.rs274.motion import check_feed, destination
 from ncfix_iso.rs274.parameters import whole
 
 LATHE_PLANE = 180
-"""G18, the plane in which lathes cut: Z, then X."""
+"""G18, the plane in which lathes cut: Z and X."""
 
 SPIRAL = "the arc winds further than its end says (L, P, Q, or a centre word across its plane)"
 
 
 def arc(control: RS274Control, block: Block, code: int) -> None:
-    """An arc, helix or full circle."""
+    """Execute an arc, a helix or a full circle."""
     check_feed(control, block)
     control.modal.motion = code
     plane = control.modal.plane
@@ -42,7 +42,7 @@ def arc(control: RS274Control, block: Block, code: int) -> None:
 
 
 def turns_of(block: Block) -> int:
-    """The P word: in how many turns the arc reaches its end."""
+    """The P word: number of turns in which the arc reaches its end."""
     turns = whole(block.get("P", 1.0), "P, the number of turns")
     if turns < 1:
         raise Fault(ARC_FAULT, f"P, the number of turns, is {turns}, and must be 1 or more")
@@ -50,7 +50,7 @@ def turns_of(block: Block) -> int:
 
 
 def refusal_of(block: Block, plane: Plane) -> str:
-    """Why an arc is refused: its centre is known only at run time."""
+    """Why an arc is refused if its centre is known only at run time; empty if it is known."""
     centre_words = set(plane.of(CENTRE_LETTERS)) | {"R"}
     if block.unknown & centre_words:
         return "the centre of the arc is known only at run time"
@@ -58,9 +58,9 @@ def refusal_of(block: Block, plane: Plane) -> str:
 
 
 def spiral(block: Block, plane: Plane) -> str:
-    """Why an arc of ISO controls is refused: further words make it wind, on a spiral or a cone, or several times.
+    """Why an arc of ISO controls is refused: further words make it a spiral, a cone, or several turns; empty if not.
 
-    Beside an R, words of its centre say nothing; L, P and Q would, once the corrected arc has its centre in words.
+    With R, centre words have no effect; but L, P and Q would have one, once the corrected arc has its centre in words.
     """
     across = 0.0 if "R" in block.values else block.get(CENTRE_LETTERS[plane.across])
     winds = block.values.keys() & {"L", "Q"} or across or block.get("P", 1.0) != 1.0
@@ -68,7 +68,7 @@ def spiral(block: Block, plane: Plane) -> str:
 
 
 def check_words(control: RS274Control, block: Block, plane: Plane) -> None:
-    """Raise `Fault` unless the block has the words that an arc in its plane needs."""
+    """Raise `Fault` if the block lacks the words that an arc in its plane needs."""
     if plane.across > 2:
         raise Fault(ARC_FAULT, "there are no arcs in the planes G17.1, G18.1 and G19.1")
     centre = [letter for letter in CENTRE_LETTERS if letter in block.values]
@@ -103,7 +103,7 @@ def centre_of(control: RS274Control, block: Block, plane: Plane, end: Point, *, 
 
 
 def supposed(control: RS274Control, block: Block, plane: Plane, end: Point) -> str:
-    """What may have been meant by an arc that is none: another plane, or X as a diameter, as on lathes."""
+    """A guess at what an impossible arc was meant to be: in another plane, or with X as a diameter; else empty."""
     letters = plane.of(CENTRE_LETTERS)
     across = CENTRE_LETTERS[plane.across]
     if "R" not in block.values and across in block.values and not all(letter in block.values for letter in letters):

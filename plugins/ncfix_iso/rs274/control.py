@@ -1,4 +1,4 @@
-"""A control of the RS274 family while it follows a program: its rules and parameters."""
+"""The state of a control of the RS274 family while it follows a program: rules and parameters."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ PASSING = frozenset(
         *("budget", "row_block", "numbers", "first"),
     }
 )
-"""Of a control: what never changes, what `lasting` looks into or a checkpoint says, and what each block sets anew."""
+"""Attributes left out by `lasting`: constant, included in part, in a checkpoint, or set by each block."""
 
 
 LENGTH_CODE = 430
 """G43."""
 
 POLAR = frozenset("@^")
-"""Addresses that together stand for X and Y."""
+"""Addresses that together define X and Y."""
 
 AXES = frozenset(LETTERS) | POLAR
 
 
 @mutable
 class Block:
-    """One block while it is executed.
+    """A block being executed.
 
-    index    the block in its program
-    values   the values of its words by address, in program units
-    unknown  addresses whose value is known only at run time: `values` has the nominal one
+    index    index of the block in its program
+    values   values of its words by address, in program units
+    unknown  addresses whose value is known only at run time; `values` has the nominal one
     axes     bit mask of the axis words, by letter
-    turn     of a cycle: the angle by which each hole lies further round the origin of the plane, degrees
+    turn     of a cycle: angle, degrees, by which each hole is rotated about the origin of the plane
     """
 
     index: int
@@ -56,11 +56,11 @@ class Block:
     turn: float | None = None
 
     def get(self, letter: str, default: float = 0.0) -> float:
-        """The value of a word."""
+        """The value of a word; `default` without it."""
         return self.values.get(letter, default)
 
     def value(self, letter: str) -> Value:
-        """The value of a word that the block has, or that it is not known."""
+        """The value of a word that the block has, as `Unknown` if it is known only at run time."""
         return Unknown(letter, self.values[letter]) if letter in self.unknown else self.values[letter]
 
 
@@ -68,18 +68,18 @@ POSITION_READ = "NCF241"
 
 
 class RS274Control(shared.ProgramControl):
-    """Everything that the steps of a block read and change.
+    """State of the control that the steps of a block read and change.
 
-    rules      what the dialect makes of codes
+    rules      the dialect's meaning of codes
     parameters numbered and named parameters
-    extended   additional work offsets (G54.1) that the program has set, and the name of that in force
-    tip_control  tool-centre-point control (G43.4) is on, whether the plane is tilted or not
-    unnamed    axes of the plane of which a rotation has gone on or off since the program named them
-    set_length what the dialect does for G43
-    left_out   the block just followed has no place in a flat program
-    pattern    the code of it that has drilled a pattern of holes, in tenths; 0: none
-    unwritten  why a flat program cannot say what the program means; empty if it can
-    saved      the modal states that M70 saved, one place for each call level
+    extended   additional work offsets (G54.1) set by the program; `extended_name`: the one in force
+    tip_control  whether tool-centre-point control (G43.4) is on, in a tilted plane or not
+    unnamed    axes of the plane that the program has not named since a rotation was switched on or off
+    set_length the dialect's step for G43
+    left_out   whether the block just executed is left out of a flat program
+    pattern    code of that block, in tenths, if it drilled a pattern of holes; else 0
+    unwritten  why the program cannot be written out flat; empty if it can
+    saved      modal states saved by M70, one entry per call level
     """
 
     frame_order = ("datum", "additive", "local", "plane", "rotation", "mirror")
@@ -103,7 +103,7 @@ class RS274Control(shared.ProgramControl):
         self.refresh()
 
     def lasting(self) -> str | None:
-        """See `RS274Control`."""
+        """See `ProgramControl`."""
         modal, parameters, knowledge = self.modal, self.parameters, self.knowledge
         cycle = replace(modal.cycle, initial=None)
         state = [each for name, each in vars(self).items() if name not in PASSING]
@@ -112,15 +112,15 @@ class RS274Control(shared.ProgramControl):
         return repr(state)
 
     def set_variables(self) -> Store:
-        """See `RS274Control`: the numbered parameters."""
+        """See `ProgramControl`: the numbered parameters."""
         return self.parameters.numbers.copy()
 
     def take_variables(self, variables: Store) -> None:
-        """See `RS274Control`."""
+        """See `ProgramControl`."""
         self.parameters.numbers = variables.copy()
 
     def path_word(self, words: Collection[str]) -> str:
-        """Axes; words of arcs while G2 or G3 is in force; in a canned cycle, its level."""
+        """See `ProgramControl`: axis words; arc words while G2 or G3 is in force; the level in a canned cycle."""
         leading = set(AXES)
         if self.modal.motion in ARCS:
             leading |= {*"IJKR"}
@@ -130,21 +130,21 @@ class RS274Control(shared.ProgramControl):
 
     @property
     def closure_mm(self) -> float:
-        """As of every control; with inches in force it is given in these."""
+        """See `ProgramControl`; while inches are in force, the limit is that in inches."""
         return self.dialect.closure_mm * (1.0 if self.modal.unit == 1.0 else INCH / 10)
 
     @property
     def takes_zero_across(self) -> bool:
-        """As of every control, but for LinuxCNC's."""
+        """See `ProgramControl`; not in LinuxCNC."""
         return not self.rules.strict
 
     @property
     def probes_nominally(self) -> bool:
-        """Whether what is known at run time only is what probing finds, and the setup says where it ends."""
+        """Whether only probing results are unknown, and the setup says where probing ends."""
         return self.setup.probed is not None and not self.parameters.inputs
 
     def anchors(self) -> list[Hashable]:
-        """As of every control; the parameters of the work offset and of G92 are not the program's numbers."""
+        """See `ControlState`; parameters of the work offset and of G92 do not count as numbers of the program."""
         frames, tool = self.frames, self.tool_shift
         own = [a + b for a, b in zip(frames.datum.shift, frames.additive.shift, strict=True)]
         system = self.modal.system, self.extended_name
@@ -154,28 +154,28 @@ class RS274Control(shared.ProgramControl):
         ]
 
     def take_length(self, number: int) -> None:
-        """See `ProgramControl`: as G43 with an H."""
+        """See `ProgramControl`: like G43 with H."""
         self.set_length(self, Block(0, {"H": float(number)}, frozenset(), 0), LENGTH_CODE)
 
     def deciding(self, function: Evaluate) -> float:
-        """A value that decides where to go on; where it is known only at run time nothing after it is certain."""
+        """A value that decides where execution continues; if it is unknown, everything after it is refused."""
         value = function(self)
         if isinstance(value, Unknown):
             self.refuse_rest(RUNTIME_BRANCH)
         return nominal(value)
 
     def read_position(self, name: str, index: int) -> Value:
-        """A position, which the program reads by this name; once it is corrected it finds another value there."""
+        """A position that the program reads by this name; unknown, because on the machine it is the corrected one."""
         self.position_is_read(name)
         return Unknown(name, nominal(self.coordinate(index)))
 
     def position_is_read(self, name: str) -> None:
-        """Say that the program reads where the machine stands."""
+        """Report that the program reads a position."""
         text = f"the program reads the position {name}: on the machine it finds the corrected one there"
         self.warn(POSITION_READ, text, "motions that are computed from it are refused")
 
     def coordinate(self, index: int) -> Value:
-        """Where an axis stands in program units, X not as a diameter; marked where it is known only at run time."""
+        """Position of an axis in program units, X as a radius; `Unknown` if it is known only at run time."""
         self.use_start_positions((index,))
         value = self.program_position()[index] / self.unit_of(index)
         return Unknown(LETTERS[index], value) if index in self.unknown or index in self.composed.unknown else value

@@ -1,7 +1,8 @@
-"""Canned cycles G73, G74, G81 to G89: one motion per hole, and where the control stands after it.
+"""Canned cycles G73, G74, G81 to G89: one motion per hole, and the position of the control after it.
 
-Source: LinuxCNC documentation, "Canned cycles"; what it leaves open was tried out on `rs274`: in incremental mode R
-counts from where the series of holes began, and a block without R or Z repeats those of the cycle in force.
+Source: LinuxCNC documentation, "Canned cycles"; what it leaves open was tested with `rs274`: in incremental mode R
+counts from the level at which the series of holes began, and a block without R or Z repeats those of the cycle in
+force.
 """
 
 from __future__ import annotations
@@ -18,20 +19,20 @@ from ncfix_iso.rs274.systems import check_system, words_of
 
 BAD_CYCLE = "NCF226"
 AXES_SAID = "NCF245"
-"""A parameter of the control says on which axes a code acts."""
+"""Code for: a parameter of the control decides on which axes a code acts."""
 ACROSS = "drilling cycles in G18 and G19 are taken to go along the axis across the plane"
 WHICH_AXIS = "check which axis the control drills along (Fanuc: parameter 5101 FXY)"
 AFTER_NONE = "where the axis {} stands after a cycle without a hole (K0, L0) differs from control to control"
 AT_RUN_TIME = "a word of the cycle is known only at run time"
 NO_DEPTH = "the retract plane (R) lies at the bottom of the hole"
 NEEDED_WORDS = {730: "Q", 830: "Q", 820: "P", 860: "P", 880: "P", 890: "P", 870: "IJK"}
-"""Words without which LinuxCNC refuses to begin a cycle."""
+"""Words without which LinuxCNC refuses to start a cycle."""
 PATTERN_WORDS = frozenset("IJKLPXY")
 """Words of a code that drills a pattern of holes."""
 
 
 def cycle(control: RS274Control, block: Block, code: int) -> None:
-    """Drill the holes of one block."""
+    """Drill the holes of a block."""
     modal, plane = control.modal, control.modal.plane
     check_cycle(control, block, code)
     if not modal.incremental and not control.offset_checked:
@@ -49,7 +50,7 @@ def cycle(control: RS274Control, block: Block, code: int) -> None:
 
 
 def check_cycle(control: RS274Control, block: Block, code: int) -> None:
-    """Raise `Fault` where LinuxCNC refuses a cycle."""
+    """Raise `Fault` if LinuxCNC would refuse the cycle."""
     if not control.rules.strict:
         return
     modal = control.modal
@@ -68,7 +69,7 @@ def check_cycle(control: RS274Control, block: Block, code: int) -> None:
 
 
 def take_words(control: RS274Control, block: Block, code: int, plane: Plane) -> None:
-    """Take R and the depth from the block, or keep those in force."""
+    """Take R and the depth from the block, else keep those in force."""
     sticky = control.modal.cycle
     in_force = control.modal.motion == code or (not control.rules.strict and sticky.initial is not None)
     depth_letter = LETTERS[plane.across]
@@ -86,7 +87,7 @@ def take_words(control: RS274Control, block: Block, code: int, plane: Plane) -> 
 
 
 def levels(control: RS274Control, initial: float) -> tuple[float, float]:
-    """R and the depth in the program's frame."""
+    """R and the depth in the program's frame, mm."""
     sticky = control.modal.cycle
     r, depth = control.modal.unit * sticky.r, control.scale[control.modal.plane.across] * sticky.depth
     if control.modal.incremental:
@@ -98,12 +99,12 @@ def levels(control: RS274Control, initial: float) -> tuple[float, float]:
 
 
 def repeat_letters(control: RS274Control, code: int) -> str:
-    """The addresses that say how often a canned cycle drills."""
+    """The addresses of the repeat count of a canned cycle."""
     return control.dialect.cycle_of(code).repeats or control.rules.repeats
 
 
 def repeats(control: RS274Control, block: Block, code: int) -> int:
-    """How many times the block drills: L, or K of most ISO controls."""
+    """The repeat count of a block: L, or K of most ISO controls."""
     letter = next((each for each in repeat_letters(control, code) if each in block.values), "L")
     count = whole(block.get(letter, 1.0), letter)
     control.budget.spend(max(count, 0))
@@ -137,7 +138,7 @@ def place_hole(control: RS274Control, block: Block, program: Vector) -> None:
 def drill(
     control: RS274Control, block: Block, code: int, program: Vector, depth: float, r: float, clear: float
 ) -> None:
-    """One hole: a motion by way of R to its bottom, after which the control stands at `clear` above it."""
+    """Drill one hole: a motion via R to its bottom, after which the control stands above it at `clear`."""
     across = control.modal.plane.across
     if across != Z and not control.rules.strict:
         control.warn(AXES_SAID, ACROSS, WHICH_AXIS)
@@ -166,7 +167,7 @@ def drill(
 
 
 def hole_unknown(control: RS274Control, block: Block) -> UnknownAxes:
-    """Which axes are not known at the bottom of a hole."""
+    """Reasons for unknown positions of axes at the bottom of a hole."""
     modal = control.modal
     unknown = dict(unknown_after(control, block, modal.incremental, control.lost_in_frame()))
     if not modal.incremental:

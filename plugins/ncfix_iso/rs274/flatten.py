@@ -1,8 +1,8 @@
-"""Blocks of the RS274 family written down as they are executed, for a flat program.
+"""Writes the blocks of a program of the RS274 family as they are executed, for a flat program.
 
-A block of plain words goes out as it stands, without its number. Expressions give way to their values, rounded to the
-least increment (in increments the rest is carried to the next block), assignments, flow control and calls fall away,
-and the holes of a cycle with increments or repeats get a block each, in absolute coordinates.
+A block of plain words is kept, without its number. Expressions are replaced by their values, rounded to the least
+increment (in increments the rest is carried to the next block). Assignments, flow control and calls are removed. The
+holes of a cycle with increments or repeats get a block each, in absolute coordinates.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from ncfix_iso.rs274.cycles import PATTERN_WORDS, repeat_letters
 from ncfix_iso.rs274.plans import Codes, RS274Plan
 
 DROPPED_CODES = {"G": frozenset({150, 160, 670}), "M": frozenset({970, 980, 990, 1980})}
-"""Codes, in tenths, that a flat program has no use for."""
+"""Codes, in tenths, that a flat program does not need."""
 
 SCALING = frozenset({500, 510})
-"""Those whose other words it has no use for, either."""
+"""Codes whose other words it does not need either."""
 
 CALL_WORDS = frozenset("PLQ")
 KEPT = frozenset({"program name", "control character", "command"})
-"""Opaque text that a flat program keeps."""
+"""Kinds of opaque text that a flat program keeps."""
 
 COMPUTED_CALL = "a macro that is not at hand is called with computed values, so the program cannot be written out flat"
 OTHER_DECIMALS, VARIABLE_DECIMALS = 4, 6
@@ -39,8 +39,8 @@ LENGTHS = frozenset((*CENTRE_LETTERS, "R", "Q"))
 class RS274Flattener(Flattener):
     """See `Flattener`.
 
-    carry   axis letter -> what rounding has left over, program units
-    headed  a program number has been written
+    carry   axis letter -> rest left over by rounding, program units
+    headed  whether a program number has been written
     plan, codes, values  of the block that has been executed
     """
 
@@ -58,26 +58,26 @@ class RS274Flattener(Flattener):
     # -- what the interpreter tells -----------------------------------------------------------------------------------
 
     def whole(self, unit: TextUnit[RS274Plan], block: int) -> None:
-        """A block as it stands."""
+        """Write a block unchanged."""
         self.watch(unit, block)
         self.write(unit.program.text_of(block))
 
     def head(self, unit: TextUnit[RS274Plan], block: int, keyword: str) -> None:
-        """The number of the main program; those of others, and all other flow control, fall away."""
+        """Write the number of the main program; other program numbers and all flow control are removed."""
         if keyword == "program" and not self.headed and not unit.external:
             self.headed = True
             self.whole(unit, block)
 
     def stretch(self, unit: TextUnit[RS274Plan], start: int, count: int) -> None:
-        """Blocks of plain words."""
+        """Write blocks of plain words."""
         for block in range(start, start + count):
             self.watch(unit, block)
             self.put([self.dropped(word) for word in self.template_words() if word.address == "N"])
 
     def call(self, unit: TextUnit[RS274Plan], block: int) -> None:
-        """The call of a macro that is in the control: as it stands, without its number.
+        """Write the call of a macro that is in the control: unchanged, without its number.
 
-        Raises `Fault` if arguments are computed: what they are computed from falls away.
+        Raises `Fault` if arguments are computed, because the assignments that they depend on are removed.
         """
         self.watch(unit, block)
         if any(not isinstance(word.value, (Literal, Constant)) for word in self.template_words()):
@@ -85,11 +85,11 @@ class RS274Flattener(Flattener):
         self.put([self.dropped(word) for word in self.template_words() if word.address == "N"])
 
     def template_words(self) -> tuple[Word, ...]:
-        """The words of the block as they are written."""
+        """The words of the block as written."""
         return self.unit.program.template_of(self.block).words
 
     def words(self, unit: TextUnit[RS274Plan], index: int, plan: RS274Plan, codes: Codes, block: Block) -> None:
-        """A block of words that has been executed."""
+        """Write a block of words that has been executed."""
         self.watch(unit, index)
         self.plan, self.codes, self.values = plan, codes, block
         self.check()
@@ -114,7 +114,7 @@ class RS274Flattener(Flattener):
             self.put(made)
 
     def polar(self, changes: list[Change]) -> None:
-        """A block with polar words: X and Y of where it leads, absolute."""
+        """Write a block with polar words, with X and Y of its end, absolute."""
         incremental, block = self.control.modal.incremental, self.values
         words = [
             word
@@ -131,7 +131,7 @@ class RS274Flattener(Flattener):
             self.write("G91")
 
     def must_stand(self, axes: int) -> None:
-        """Raise `Fault` where absolute words would have to say where an axis stands, and the program has not."""
+        """Raise `Fault` if an absolute word would be needed for an axis that the program has not placed."""
         unplaced = self.control.places.unplaced & axes
         index = next((index for index in self.control.axis_indices if unplaced >> index & 1), None)
         if index is not None:
@@ -139,7 +139,7 @@ class RS274Flattener(Flattener):
             raise Fault(RUNTIME, f"{what}, so it cannot be written out flat")
 
     def check(self) -> None:
-        """Raise `Fault` where the values of a block depend on the machine at run time."""
+        """Raise `Fault` if the values of a block depend on the machine at run time."""
         block, why = self.values, self.control.unwritten
         if not why and (block.unknown or self.control.refusal == RUNTIME_BRANCH):
             what = f"the word {min(block.unknown)}" if block.unknown else "which blocks are executed"
@@ -154,7 +154,7 @@ class RS274Flattener(Flattener):
         return None if item.kind in KEPT else self.dropped(item)
 
     def assignment(self, item: Assignment) -> Change:
-        """It falls away, unless the control does something with it (offsets, for one) or keeps it."""
+        """Remove it, unless the control acts on the parameter (offsets, for example) or keeps it after the program."""
         target, rules = item.target, self.control.rules
         if isinstance(target, NumberedParameter) and isinstance(target.index, Literal):
             number = round(float(self.unit.program.values_of(self.block)[target.index.slot]))
@@ -163,7 +163,7 @@ class RS274Flattener(Flattener):
         return self.dropped(item)
 
     def value_of(self, number: int) -> str:
-        """The value of a parameter as text; raises `Fault` where it depends on the machine at run time."""
+        """The value of a parameter as text; raises `Fault` if it depends on the machine at run time."""
         parameters = self.control.parameters
         if parameters.is_unknown(number):
             what = f"what #{number} is set to"
@@ -172,7 +172,7 @@ class RS274Flattener(Flattener):
         return "#0" if math.isnan(value) else PLAIN.short(value, VARIABLE_DECIMALS)
 
     def word(self, word: Word) -> Change | None:
-        """What becomes of a word."""
+        """The change to a word; None if it stays."""
         letter, values = word.address, self.values.values
         called = not DROPPED_CODES["M"].isdisjoint(self.codes.m.values())
         if letter in "GM":
@@ -184,13 +184,13 @@ class RS274Flattener(Flattener):
         return self.replaced(word.value_span, self.number(letter, values[letter]))
 
     def is_changed(self, word: Word, number: Literal) -> bool:
-        """Whether a word with a plain number means another value than what is written (polar coordinates)."""
+        """Whether the value of a plain word differs from what is written (polar coordinates)."""
         if number.pointless:
             return word.address in "XYZ" and "polar" in self.control.suspended
         return bool(self.unit.program.values_of(self.block)[number.slot] != self.values.values[word.address])
 
     def code(self, word: Word) -> Change | None:
-        """What becomes of a G or M word."""
+        """The change to a G or M word; None if it stays."""
         if isinstance(word.value, Constant):
             dropped = round(10 * word.value.value) in DROPPED_CODES[word.address]
             return self.dropped(word) if dropped else None
@@ -198,7 +198,7 @@ class RS274Flattener(Flattener):
         return self.dropped(word) if math.isnan(value) else self.replaced(word.value_span, f"{value:g}")
 
     def absent(self) -> list[Change]:
-        """Words that a block means and does not have: the other coordinate of a polar one."""
+        """Words that a block implies and does not have: the other coordinate of a polar one."""
         values = self.values.values
         letters = [letter for letter in values if letter not in self.plan.letters and letter in "XYZ"]
         stop = self.end_of_words()
@@ -217,14 +217,14 @@ class RS274Flattener(Flattener):
         return text
 
     def decimals(self, letter: str) -> int:
-        """Digits after the point that the least increment needs."""
+        """Number of decimals that the least increment needs."""
         unit = 1.0 if letter in INDEX and self.control.rotary[INDEX[letter]] else self.control.modal.unit
         return decimals_for(self.steps.get(letter, min(self.steps.values())) / unit)
 
     # -- cycles -------------------------------------------------------------------------------------------------------
 
     def cycle(self, changes: list[Change], holes: list[Vector]) -> None:
-        """The holes of a block, one block each, in absolute coordinates."""
+        """Write the holes of a block, one block each, in absolute coordinates."""
         code = self.control.modal.motion if self.codes.motion is None else self.codes.motion
         drop = [word for word in self.template_words() if is_place(word, self.control, code)]
         stop = self.end_of_words()
@@ -245,7 +245,7 @@ class RS274Flattener(Flattener):
             self.write("G91")
 
     def pattern(self, code: int, holes: list[Vector]) -> None:
-        """The holes of a code that works out where they are, one block each, behind what else stands in its own."""
+        """Write the holes of a pattern code, one block each, after the other words of its block."""
         words = self.template_words()
         own = [word for word in words if isinstance(word.value, Constant) and round(10 * word.value.value) == code]
         taken = {*PATTERN_WORDS, "N"}
@@ -254,9 +254,9 @@ class RS274Flattener(Flattener):
             self.write(self.place(hole, "XY").strip())
 
     def letters_of_holes(self, block: Block) -> tuple[str, str]:
-        """The letters that say where a hole is in the plane, and what else the first one needs, its depth last.
+        """The letters that position a hole in the plane, and further ones that the first hole needs, its depth last.
 
-        Raises `Fault` where an increment would have to become a word for an axis that the program has not placed.
+        Raises `Fault` if an increment would have to become a word for an axis that the program has not placed.
         """
         plane = self.control.modal.plane
         if self.control.modal.incremental:
@@ -269,7 +269,7 @@ class RS274Flattener(Flattener):
         return over, named.replace(across, "") + across
 
     def place(self, hole: Vector, letters: str) -> str:
-        """The words of a hole for some letters."""
+        """The words of a hole for some letters, as text."""
         control = self.control
         position, control.position = control.position, hole
         program = control.program_position()
@@ -285,26 +285,26 @@ class RS274Flattener(Flattener):
     # -- lines --------------------------------------------------------------------------------------------------------
 
     def without(self, words: list[Word], changes: list[Change]) -> list[Change]:
-        """The changes of a block from which some words fall away."""
+        """The changes of a block, with some words removed."""
         spans = {self.unit.program.span(self.block, word.span) for word in words}
         return [change for change in changes if not inside(change, spans)] + list(map(self.dropped, words))
 
     def end_of_words(self) -> int:
-        """Where further words of a block go: after its last word, before a comment."""
+        """The place for further words of a block: after its last word, before a comment."""
         program = self.unit.program
         items = [item for item in program.items_of(self.block) if not isinstance(item, Comment)]
         ends = (program.span(self.block, item.span)[1] for item in items)
         return max(ends, default=int(program.blocks[self.block, 0]))
 
     def put(self, changes: list[Change]) -> None:
-        """Write a block with changes made; not if nothing is left of it."""
+        """Write a block with changes made, unless nothing is left of it."""
         text = self.text(changes)
         if text.strip() or not (changes or text):
             self.write(text.strip() if changes else text)
 
 
 def is_setting(word: Word) -> bool:
-    """Whether a word stays though its block has no place in a flat program: another code, F, S or T."""
+    """Whether a word stays although its block is left out of a flat program: another code, F, S or T."""
     scaling = isinstance(word.value, Constant) and round(10 * word.value.value) in SCALING
     return word.address in "GMFST" and not (word.address == "G" and scaling)
 
@@ -315,7 +315,7 @@ def is_distance(word: Word) -> bool:
 
 
 def is_place(word: Word, control: RS274Control, code: int) -> bool:
-    """Whether a word of a cycle says where its holes are, how many, or in which mode: that is written anew."""
+    """Whether a word of a cycle gives the place or number of its holes, or the mode: such words are written anew."""
     if word.address in "GM":
         return is_distance(word)
     placed = word.address in INDEX or word.address in POLAR or word.address == control.dialect.cycle_of(code).level
@@ -323,5 +323,5 @@ def is_place(word: Word, control: RS274Control, code: int) -> bool:
 
 
 def inside(change: Change, spans: set[tuple[int, int]]) -> bool:
-    """Whether a change lies in a stretch that is taken out."""
+    """Whether a change lies within a removed span."""
     return any(start <= change.start and change.stop <= stop for start, stop in spans)

@@ -1,9 +1,9 @@
-"""O-words: subprograms, branches and loops, and M98 and M99, followed as LinuxCNC's interpreter does.
+"""O-words: subprograms, branches and loops, and M98 and M99, executed as by LinuxCNC's interpreter.
 
-The interpreter reads on from line to line. A branch not taken, a loop left, a subprogram being defined or looked for
-make it skip: it passes over all lines but o-words with the label that it waits for. Labels are known once they have
-been met, and may be computed: so what an o-word comes down to is found out when it is executed.
-Source: LinuxCNC documentation, "O codes"; what it leaves open was tried out on `rs274`.
+The interpreter reads line by line. After a branch that is not taken, at the end of a loop, and while a subprogram is
+defined or looked for, it skips: it ignores all lines except o-words with the label that it waits for. Labels are known
+only once they have been met, and may be computed: so the effect of an o-word is determined when it is executed.
+Source: LinuxCNC documentation, "O codes"; what it leaves open was tested with `rs274`.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from ncfix_iso.rs274.settings import restore
 
 BAD_FLOW = NO_LABEL
 MAX_CALLS = 9
-"""How deep subprograms may be nested (LinuxCNC: 10, with the main program)."""
+"""Largest nesting depth of subprograms (LinuxCNC: 10, with the main program)."""
 
 GLOBAL = frozenset({"sub", "endsub", "call", "return", "program"})
 ENDS_OF_LOOPS = {"endwhile": "while", "endrepeat": "repeat"}
 NO_REPEATS = "whether a call with L0 is executed differs from control to control"
 BY_CODE = "M98"
-"""The kind of calls that share #1 to #30 with the caller."""
+"""Kind of the calls that share #1 to #30 with the caller."""
 
 
 @mutable
 class Label:
-    """Where an o-word was first met, as what, and how many times a `repeat` is still to run."""
+    """Where an o-word was first met, its keyword, and the remaining runs of a `repeat`."""
 
     unit: RS274Unit
     block: int
@@ -42,23 +42,23 @@ class Label:
 
 
 def oword(name: str) -> str:
-    """A label as it is written, without the subprogram that it stands in: `o100`, `o<name>`."""
+    """A label as written, without the subprogram it is in: `o100`, `o<name>`."""
     label = name.rpartition("#")[2]
     return f"o{label}" if label.isdigit() else f"o<{label}>"
 
 
 class OWords(ProgramFlow[RS274Unit]):
-    """Where execution stands, and where o-words take it.
+    """The program counter, and the effect of o-words on it.
 
-    name             the full name of the label of the o-word that is executed
-    labels           all that have been met, by their full names
-    skipping         the label that execution waits for; None while it does not skip
-    skipping_from    where that began
-    skipping_to_sub  what is waited for is the begin of a subprogram that has been called
-    defining         the subprogram that is being defined and passed over; None outside of one
-    executed_if      a branch of the `if` that was met last has been executed
-    breaking         a `break` has been executed, and the end of its loop is waited for
-    continuing       the same of a `continue`
+    name             full name of the label of the o-word being executed
+    labels           all labels met so far, by full name
+    skipping         label for which execution waits; None while not skipping
+    skipping_from    where skipping began
+    skipping_to_sub  whether it waits for the beginning of a called subprogram
+    defining         subprogram that is being defined and skipped; None outside of one
+    executed_if      whether a branch of the last `if` has been executed
+    breaking         whether a `break` was executed and the end of its loop is awaited
+    continuing       whether a `continue` was executed and the end of its loop is awaited
     """
 
     most_calls = MAX_CALLS
@@ -99,7 +99,7 @@ class OWords(ProgramFlow[RS274Unit]):
     # -- labels -------------------------------------------------------------------------------------------------------
 
     def name_of(self, flow: FlowLine) -> str:
-        """The full name of a label: local ones carry the name of the subprogram that they stand in."""
+        """The full name of a label; local labels are prefixed by the subprogram they are in."""
         label = flow.label if isinstance(flow.label, str) else self.computed_label(flow.label)
         if flow.keyword in GLOBAL:
             return label
@@ -107,7 +107,7 @@ class OWords(ProgramFlow[RS274Unit]):
         return f"{scope}#{label}"
 
     def computed_label(self, label: Evaluate) -> str:
-        """A label given by an expression; where execution skips it may not have a value, and is none then."""
+        """A label given by an expression; `?` if it has no value while skipping."""
         try:
             return str(whole(nominal(label(self.control)), "a label"))
         except Fault:
@@ -116,7 +116,7 @@ class OWords(ProgramFlow[RS274Unit]):
             return "?"
 
     def enter_label(self, flow: FlowLine, name: str) -> Label:
-        """Note where a label stands; raises `Fault` if it stands elsewhere too."""
+        """Record the place of a label; raises `Fault` if it is used elsewhere, too."""
         known = self.labels.setdefault(name, Label(self.unit, self.block - 1, flow.keyword))
         if known.block != self.block - 1 or known.unit is not self.unit:
             line = known.unit.program.line(known.block)
@@ -124,14 +124,14 @@ class OWords(ProgramFlow[RS274Unit]):
         return known
 
     def known(self, name: str, keyword: str, *openings: str) -> Label:
-        """The label that a line with this keyword belongs to; raises `Fault` if it was not met as one of `openings`."""
+        """The label of a line with this keyword; raises `Fault` if it was not met before as one of `openings`."""
         known = self.labels.get(name)
         if known is None or known.keyword not in openings:
             raise Fault(BAD_FLOW, f"{oword(name)} {keyword} has no {' or '.join(openings)} before it")
         return known
 
     def skip_to(self, name: str) -> None:
-        """Pass over what follows, up to o-words with this label."""
+        """Skip lines up to o-words with this label."""
         self.skipping = name
         self.skipping_from = (self.unit, self.block - 1)
 
@@ -142,7 +142,7 @@ class OWords(ProgramFlow[RS274Unit]):
     # -- the walk -----------------------------------------------------------------------------------------------------
 
     def arrive(self) -> bool:
-        """See `ProgramFlow`; while skipping: go to the next o-word of this text."""
+        """See `ProgramFlow`; while skipping, go to the next o-word of this text."""
         if self.skipping is not None:
             at = bisect_left(self.unit.flows, self.block)
             if at == len(self.unit.flows):
@@ -153,7 +153,7 @@ class OWords(ProgramFlow[RS274Unit]):
         return self.block < self.unit.stop
 
     def lowered(self, line: FlowLine, unit: RS274Unit, block: int) -> tuple[Operation, ...]:
-        """What an o-word comes down to: it is passed over, or does what it says; then execution may skip."""
+        """The operations of an o-word: it is ignored, or executed; then execution may skip."""
         handler = self.handlers[line.keyword]
         return (
             Jump(None, partial(self.passes_over, line)),
@@ -162,7 +162,7 @@ class OWords(ProgramFlow[RS274Unit]):
         )
 
     def passes_over(self, flow: FlowLine) -> bool:
-        """Whether an o-word does nothing, while something else is waited for or a subprogram defined."""
+        """Whether an o-word is ignored because another one is awaited or a subprogram is being defined."""
         name, keyword = self.name_of(flow), flow.keyword
         self.name = name
         if keyword in ("sub", "program") and self.defining is not None:
@@ -174,7 +174,7 @@ class OWords(ProgramFlow[RS274Unit]):
         return self.defining is not None and keyword not in ("endsub", "return")
 
     def unfinished(self) -> Fault | None:
-        """What is wrong if the text ends here."""
+        """The error if the text ends here; None if it may."""
         if self.skipping is not None:
             return self.missing_end()
         if self.calls:
@@ -184,7 +184,7 @@ class OWords(ProgramFlow[RS274Unit]):
         return None
 
     def missing_end(self) -> Fault:
-        """The fault of a text that ends while something is still looked for."""
+        """The error for a text that ends while something is still awaited."""
         label = oword(self.skipping or "")
         if self.skipping_to_sub:
             hint = "it is looked for further down, in files beside the program, and where --subprograms DIR says"
@@ -195,7 +195,7 @@ class OWords(ProgramFlow[RS274Unit]):
     # -- subprograms --------------------------------------------------------------------------------------------------
 
     def subprogram(self, flow: FlowLine, name: str) -> None:
-        """`sub`, or a bare program number: it begins here, or is only defined here."""
+        """`sub`, or a bare program number: the subprogram begins here, or is only defined."""
         by_code = bool(self.calls) and self.calls[-1].kind == BY_CODE
         if self.calls and self.skipping is not None and by_code != (flow.keyword == "program"):
             raise Fault(
@@ -227,7 +227,7 @@ class OWords(ProgramFlow[RS274Unit]):
             self.control.refuse_rest(NO_REPEATS)
 
     def begin(self, label: str, left: int, kind: str, restored: Callable[[], None]) -> None:
-        """Enter a subprogram: known already, in a file of its own, or further down."""
+        """Enter a subprogram that is known, in a file of its own, or further down in the text."""
         self.check_depth(oword(label))
         control, known = self.control, self.labels.get(label)
 
@@ -272,7 +272,7 @@ class OWords(ProgramFlow[RS274Unit]):
         super().finish(kind, again=again)
 
     def go_to(self, label: Label) -> None:
-        """Go on at a label."""
+        """Continue at a label."""
         self.unit, self.block = label.unit, label.block
 
     # -- branches -----------------------------------------------------------------------------------------------------
@@ -312,12 +312,12 @@ class OWords(ProgramFlow[RS274Unit]):
     # -- loops --------------------------------------------------------------------------------------------------------
 
     def do(self, flow: FlowLine, name: str) -> None:
-        """`do`: a loop whose condition stands at its end."""
+        """`do`: the beginning of a loop with its condition at the end."""
         self.skipping = None
         self.labels.setdefault(name, Label(self.unit, self.block - 1, flow.keyword))
 
     def loop(self, flow: FlowLine, name: str) -> None:
-        """`while [..]`: the begin of a loop, or the end of a `do`."""
+        """`while [..]`: the beginning of a loop, or the end of a `do` loop."""
         known = self.labels.get(name)
         self.skipping = None
         value = self.argument(flow)

@@ -1,4 +1,4 @@
-"""Modal groups: which codes exclude one another, which of them a dialect knows, and those that it adds of its own.
+"""Modal groups: which codes exclude each other, which of them a dialect knows, and the codes that it adds.
 
 Sources: LinuxCNC documentation, "G-code modal groups"; for ISO controls the lists of G codes in the Fanuc 30i, Haas
 and Okuma programming manuals. Codes are in tenths: G38.2 is 382.
@@ -48,11 +48,11 @@ USER = "user-defined"
 CALL = "subprogram"
 
 OWN = "code of the dialect's own "
-"""What the group of a code that a dialect adds begins with: each has a group of its own."""
+"""Beginning of the group name of a code added by a dialect; each such code has its own group."""
 
 CYCLES = (730, 740, 810, 820, 830, 840, 850, 860, 870, 880, 890)
 DYNAMIC_OFFSETS = (431, 432)
-"""G43.1 and G43.2, which take the axis words of blocks without a motion code."""
+"""G43.1 and G43.2, which use the axis words of blocks without a motion code."""
 
 ARCS = (20, 30)
 PROBES = (382, 383, 384, 385)
@@ -60,11 +60,11 @@ SPLINES = (50, 51, 52)
 THREADS = (330, 331, 760)
 TURNING_CYCLES = (700, 710, 711, 712, 720, 721, 722)
 DIN_UNITS = {700: 200, 710: 210}
-"""G70 and G71 of DIN 66025, and the codes that mean the same."""
+"""G70 and G71 of DIN 66025, and the codes with the same meaning."""
 
 
 def grouped(**codes: tuple[int, ...]) -> dict[int, str]:
-    """Code -> group, from keyword arguments that name the constants above."""
+    """Code -> group, from keyword arguments named like the constants above."""
     return {code: globals()[name] for name, members in codes.items() for code in members}
 
 
@@ -96,7 +96,7 @@ ISO_G = {code: group for code, group in LINUXCNC_G.items() if code not in (70, 8
 ISO_HARMLESS_G = frozenset(code * 10 for code in (5, 8, 9, 11, 23, 25, 26, 62, 63, 103, 187, 332)) | {51, 53}
 """Codes of ISO controls that move nothing and change no coordinates: exact stop, look-ahead, smoothing, limits.
 
-G5.3 P is how smooth Hurco makes a surface, G332 R how fast or true DMG MORI goes.
+G5.3 P selects the surface smoothness on Hurco, G332 R the balance of speed and accuracy on DMG MORI.
 """
 
 LINUXCNC_M = grouped(
@@ -111,7 +111,7 @@ LINUXCNC_M = grouped(
 )
 
 TOOL_CHANGE = 60
-"""M6. Of two tools that Mazak names with it, the first is changed, and the second only brought for the next change."""
+"""M6. Of two tools that Mazak names with it, the first is loaded, the second only prepared for the next change."""
 
 
 DRILLING = tuple(code for code in CYCLES if code >= 810)
@@ -119,7 +119,7 @@ DRILLING = tuple(code for code in CYCLES if code >= 810)
 
 @frozen
 class Uses:
-    """Which codes use an address: motion codes, other G codes of the block, M codes of the block; in tenths."""
+    """The codes that use an address: motion codes, other G codes, and M codes of the block; in tenths."""
 
     motions: frozenset[int] = frozenset()
     g_codes: frozenset[int] = frozenset()
@@ -127,7 +127,7 @@ class Uses:
 
 
 def uses(motions: tuple[int, ...] = (), g: tuple[int, ...] = (), m: tuple[int, ...] = ()) -> Uses:
-    """`Uses` from tuples; the cycles of turning use every address."""
+    """`Uses` from tuples; turning cycles use every address."""
     return Uses(frozenset((*motions, *TURNING_CYCLES)), frozenset(g), frozenset(m))
 
 
@@ -153,7 +153,7 @@ USED_BY: dict[str, Uses] = {
 
 
 def unused_word(letters: Set[str], motion: int | None, g_codes: Set[int], m_codes: Set[int]) -> str | None:
-    """The first address that no code of the block uses."""
+    """The first address that no code of the block uses; None if there is none."""
     for letter, users in USED_BY.items():
         used = motion in users.motions or g_codes & users.g_codes or m_codes & users.m_codes
         if letter in letters and not used:
@@ -163,28 +163,28 @@ def unused_word(letters: Set[str], motion: int | None, g_codes: Set[int], m_code
 
 @frozen
 class Rules:
-    """What a dialect makes of codes.
+    """The meaning that a dialect gives to codes.
 
-    strict      whatever LinuxCNC's interpreter refuses is an error: unknown codes, words that no code uses, no feed
-    g_groups    the group of every G code that is followed
-    harmless_g  G codes that are passed over
-    m_groups    the group of every M code that is followed
-    steps       G code -> what is done for it instead of what `order` says
+    strict      whatever LinuxCNC's interpreter refuses is an error: unknown codes, unused words, missing feed
+    g_groups    group of each G code that is followed
+    harmless_g  G codes that are ignored
+    m_groups    group of each M code that is followed
+    steps       G code -> its step, if it differs from that in `order`
     cycles      G codes of canned cycles
-    repeats     addresses that say how often a canned cycle drills
-    takes       G codes that take the axis words of their block for themselves, besides those of `plans`
-    radius_first  where an arc has R and a centre, R counts; elsewhere that is an error
-    length_by_h_alone  H without G43 in its block may be another length, or none, as the control has it
-    din_units   G70 and G71 by themselves are inches and millimetres, as in DIN 66025
-    adds_rotations  in G91 the angle of G68 is added to that in force
-    scales_named  scaling (G51) acts on the axes only that its block names
-    offset_group  the group of the work offsets' codes: 14 where #4014 tells which is in force
-    system      whether a numbered parameter is one of the control's own, so that setting it does something
-    lasting     whether a numbered parameter keeps its value when the program is over
-    compiled    (expression, the address it stands behind) -> the function that computes it
-    aliases     G or M and code -> the code of the family that a code of the dialect's own stands for
-    operations  G or M and code -> what a code of the dialect's own does
-    tables      G code -> the drilling cycle that a code of the dialect's own is
+    repeats     addresses of the repeat count of a canned cycle
+    takes       further G codes, besides those of `plans`, that use the axis words of their block themselves
+    radius_first  of R and a centre in one block R is used; otherwise both together are an error
+    length_by_h_alone  H without G43 may change the tool length, depending on the control
+    din_units   G70 and G71 alone are inches and millimetres, as in DIN 66025
+    adds_rotations  in G91 the angle of G68 is added to the one in force
+    scales_named  scaling (G51) acts only on the axes named in its block
+    offset_group  group number of the work offset codes: 14 where #4014 contains the one in force
+    system      number -> whether this parameter belongs to the control, so that assigning to it has an effect
+    lasting     number -> whether this parameter keeps its value after the program
+    compiled    (expression, its address) -> function that computes it
+    aliases     (G or M, code) -> code of the family for which a dialect's own code stands
+    operations  (G or M, code) -> operations of a dialect's own code
+    tables      G code -> drilling cycle of a dialect's own code
     """
 
     strict: bool
@@ -212,11 +212,11 @@ class Rules:
 LINUXCNC = Rules(True, LINUXCNC_G, frozenset(), repeats="L")
 ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40, 921}), length_by_h_alone=True, din_units=True)
 RULES = {"iso": ISO, "linuxcnc": LINUXCNC}
-"""By `Dialect.semantics`."""
+"""Rules by `Dialect.semantics`."""
 
 
 def with_own_codes(rules: Rules, dialect: Dialect) -> Rules:
-    """The rules of a dialect: those of its family, and what it adds."""
+    """The rules of a dialect: those of its family with its own codes added."""
     for name, operations in dialect.codes:
         letter, code = name[0], tenths(name)
         if len(operations) == 1 and operations[0].alone:
@@ -231,13 +231,13 @@ def with_own_codes(rules: Rules, dialect: Dialect) -> Rules:
 
 
 def with_m_code(rules: Rules, code: int, operations: tuple[CodeOperation, ...]) -> Rules:
-    """An M code that is a few operations, or none."""
+    """The rules with an M code that performs `operations`."""
     m_groups = {**rules.m_groups, code: f"{OWN}M{code}"}
     return replace(rules, m_groups=m_groups, operations={**rules.operations, ("M", code): operations})
 
 
 def with_g_code(rules: Rules, code: int, operations: tuple[CodeOperation, ...]) -> Rules:
-    """A G code that is a few operations; one with none is passed over."""
+    """The rules with a G code that performs `operations`; without any it is ignored."""
     known = {known: group for known, group in rules.g_groups.items() if known != code}
     takes = {code} if any(operation.takes for operation in operations) else set[int]()
     return replace(
@@ -250,7 +250,7 @@ def with_g_code(rules: Rules, code: int, operations: tuple[CodeOperation, ...]) 
 
 
 def with_cycle(rules: Rules, code: int, table: CycleTable) -> Rules:
-    """A drilling cycle."""
+    """The rules with a drilling cycle."""
     return replace(
         rules,
         g_groups={**rules.g_groups, code: MOTION},

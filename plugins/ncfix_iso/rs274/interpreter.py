@@ -1,4 +1,4 @@
-"""The walk through a program: block after block, as flow control leads, and which motion each block executes."""
+"""Executes a program block by block, as flow control leads, and decides which motion each block makes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ WITHOUT_AXES = frozenset((0, 10, *ARCS, 52, NO_MOTION, *TURNING_CYCLES))
 
 
 def explicit_motion(control: RS274Control, codes: Codes, motion: int, has_axes: bool) -> int | None:
-    """The motion code that a block names, if it is executed."""
+    """The motion code named in a block, or None if it is not executed there."""
     if codes.takes and motion != NO_MOTION:
         only_modal(control, motion, "two G codes of the block both use its axis words")
         return None
@@ -47,7 +47,7 @@ def explicit_motion(control: RS274Control, codes: Codes, motion: int, has_axes: 
 
 
 def only_modal(control: RS274Control, motion: int, fault: str) -> None:
-    """A motion code that comes into force and moves nothing yet; LinuxCNC refuses it."""
+    """Bring a motion code into force without a motion; LinuxCNC refuses that."""
     if control.rules.strict:
         raise Fault(BAD_MOTION, fault)
     control.modal.motion = motion
@@ -55,10 +55,10 @@ def only_modal(control: RS274Control, motion: int, fault: str) -> None:
 
 CALL, RETURN = 980, 990
 DRILLING = 810
-"""G81, as which drilling cycles of a dialect's own are followed."""
+"""G81: own drilling cycles of a dialect are followed like it."""
 PROGRAM_ENDS = (20, 300)
 LAST_PROGRAM = 9999
-"""Greater P words of M98 on ISO controls hold the number of repeats before the four digits of the program."""
+"""Larger P words of M98 on ISO controls contain the repeat count before the four digits of the program."""
 
 POLAR_WORDS = "polar coordinates (@ ^); --flatten writes them in X and Y"
 COMPUTED_ALIAS = "the code {} is computed, and takes words under other addresses than the code it stands for"
@@ -68,10 +68,10 @@ NOT_SET = "NCF244"
 BAD_CALL = "NCF242"
 REPEATS = "whether K beside M98 repeats the call differs from control to control"
 HARMLESS_COMMAND = re.compile(r"\$(?:[$#GINX]?|N\d*=.*|\d{1,2}=.*|\w+\.MIN%?)(?=[;(]|$)")
-"""Grbl's `$$`, `$X`, `$10=3`: none changes a place, as steps to the mm (`$100=`) do. And the head of Okuma's files."""
+"""Harmless commands: Grbl's `$$`, `$X`, `$10=3`, but not steps per mm (`$100=`); and the head of Okuma's files."""
 NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"
 DWELL_TIME = "PUX"
-"""The words of G4 on ISO controls; beside P, X is a motion to some."""
+"""Words of G4 on ISO controls; besides P, X is a motion on some."""
 
 INCREMENTS = " If U V W are increments of X Y Z, as on lathes: these are not followed"
 
@@ -98,7 +98,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         systems.load_setup(control)
 
     def prepared(self) -> ProgramFlow[RS274Unit]:
-        """Give the control its own parameters; where execution begins."""
+        """Install the control's own parameters; returns the flow at the beginning of the program."""
         control = self.control
         flow = OWords(control, self.main, self.find)
         control.parameters.persistent = lambda number: systems.before_persistent(control, number)
@@ -108,14 +108,14 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         return flow
 
     def not_set(self, number: int) -> Value:
-        """The program reads a variable that somebody else may have set, and whose value without that may be none."""
+        """Report a variable that the program reads and has not set; its value is known only at run time."""
         text = f"the program reads #{number}, which it has not set: what is in it is known only at run time"
         self.control.warn(NOT_SET, text, f'variables."#{number}" in the setup file')
         return Unknown(f"#{number}")
 
     @property
     def to_the_last(self) -> bool:
-        """See `Interpreter`: o-words are not in parts."""
+        """See `Interpreter`; programs with o-words are not read in parts."""
         return False
 
     def spellings(self, name: str) -> Iterable[str]:
@@ -137,7 +137,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         return WAITS if self.control.refusal == RUNTIME_BRANCH else NEVER_ENDS
 
     def lane_is_open(self, plan: RS274Plan) -> bool:
-        """See `Interpreter`; not while something is done between motions."""
+        """See `Interpreter`; closed while axes of a switched rotation have not been named."""
         return plan.lane is not None and not self.control.unnamed
 
     def note_stretch(self, unit: RS274Unit, block: int, done: int) -> None:
@@ -146,7 +146,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             self.watcher.stretch(unit, block, done)
 
     def end_of_text(self) -> bool:
-        """The text is over without M2, M30 or `%`."""
+        """See `Interpreter`: the text ends without M2, M30 or `%`."""
         fault = self.flow.unfinished()
         if fault is not None:
             raise fault
@@ -156,7 +156,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
     # -- one block ----------------------------------------------------------------------------------------------------
 
     def execute(self, plan: RS274Plan, unit: RS274Unit, block: int) -> bool:
-        """Execute a block; True if the program ends there."""
+        """Execute a block; returns whether the program ends there."""
         if plan.unknown_text is not None:
             self.note_unknown(plan.unknown_text)
         if plan.tape:
@@ -174,7 +174,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         return self.execute_words(plan, block)
 
     def beside_statement(self, plan: RS274Plan, index: int) -> bool:
-        """Execute the words that stand beside the number of a program that begins there (not in LinuxCNC)."""
+        """Execute words beside the program number with which a program begins (not in LinuxCNC)."""
         begins = plan.flow is not None and plan.flow.keyword == "program"
         if self.control.rules.strict or not begins or not has_words(plan):
             return False
@@ -184,7 +184,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         return ended
 
     def at_tape(self, unit: RS274Unit, block: int) -> bool:
-        """`%`: the first line of a tape, or its end; controls but LinuxCNC pass over comments before it."""
+        """`%`: the first line of a tape, or its end; controls other than LinuxCNC ignore comments before the first."""
         leading = [item for before in range(block) for item in unit.plan(before).template.items]
         if self.first and all(isinstance(item, Comment) and not self.control.rules.strict for item in leading):
             return False
@@ -194,7 +194,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         return True
 
     def execute_words(self, plan: RS274Plan, index: int) -> bool:
-        """Execute a block of words and assignments."""
+        """Execute a block of words and assignments; returns whether the program ends there."""
         control = self.control
         if plan.unread:
             raise Fault(UNREADABLE, "this line cannot be read, and the control gets to it")
@@ -221,7 +221,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         return self.after(codes, block)
 
     def motion_of(self, plan: RS274Plan, codes: Codes) -> int | None:
-        """The motion code that a block executes; raises `Fault` where its axis words have no code."""
+        """The motion code that a block executes; None if none. Raises `Fault` if its axis words have no code."""
         control, has_axes, modal = self.control, plan.axes != 0, self.control.modal.motion
         if codes.motion is not None:
             return explicit_motion(control, codes, codes.motion, has_axes)
@@ -239,12 +239,12 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         return modal if plan.letters & {"I", "J", "K"} and modal in ARCS else None
 
     def settings(self, codes: Codes, block: Block) -> None:
-        """What a block sets before its motion."""
+        """Execute the settings of a block, before its motion."""
         for step, code in codes.steps:
             step(self.control, block, code)
 
     def evaluate(self, plan: RS274Plan, index: int) -> Block:
-        """The values of a block; its assignments take effect when all have been read."""
+        """The values of a block's words; its assignments take effect after all have been evaluated."""
         control = self.control
         numbers, first = control.numbers, control.first
         values = {letter: numbers[first + slot] for letter, slot in plan.literals}
@@ -262,7 +262,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         return Block(index, values, frozenset(unknown), plan.axes)
 
     def assign(self, plan: RS274Plan) -> None:
-        """Set the parameters that a block sets, all at once."""
+        """Assign the parameters of a block, all at once."""
         parameters = self.control.parameters
         pending = []
         for target, function, span in plan.assignments:
@@ -293,7 +293,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         return grouped_codes(pairs, plan.letters, self.control.rules)
 
     def unknown_codes(self, plan: RS274Plan, codes: Codes) -> None:
-        """G codes that are not known."""
+        """Handle unknown G codes."""
         spans = {
             w.value.value: w.span for w in plan.template.words if w.address == "G" and isinstance(w.value, Constant)
         }
@@ -303,7 +303,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         self.span = None
 
     def note_foreign(self, plan: RS274Plan) -> None:
-        """Note axes that the program moves and the machine lacks."""
+        """Record axes that the program moves and the machine lacks."""
         control = self.control
         for index, letter in enumerate(LETTERS):
             if plan.axes >> index & 1 and index not in control.axis_indices and letter not in control.foreign:
@@ -313,14 +313,14 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         self.span = None
 
     def note_unknown(self, span: Span) -> None:
-        """A command of a machine's own, or text of a plugin's grammar: nobody knows what it does."""
+        """Refuse all motions after a machine's own command or unknown text of a plugin's grammar."""
         if not self.control.refusal:
             text = self.flow.unit.program.slice(self.flow.block - 1, span).strip()
             self.control.refusal = NOT_KNOWN.format(text.split()[0][:30])
             self.control.warn("NCF228", self.control.refusal, "all motions after it are refused")
 
     def command(self, span: Span) -> None:
-        """A command to Grbl itself: homing and jogging move the machine, and what is none of its may do anything."""
+        """Execute a command to Grbl itself: homing and jogging move the machine, unknown ones may do anything."""
         text = self.flow.unit.program.slice(self.flow.block - 1, span).upper().replace(" ", "")
         if text.startswith(("$H", "$J=")):
             self.control.lose(self.control.axis_indices, MACHINE_MOVED)
@@ -329,7 +329,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
 
     @contextmanager
     def polar_words(self, block: Block) -> Iterator[None]:
-        """Motions with @ or ^ are followed; written they can be in X and Y only."""
+        """Context for a motion with @ or ^: it is followed but refused, because it can only be written with X and Y."""
         polar = bool(block.values.keys() & POLAR)
         if polar:
             self.control.suspend(POLAR_WORDS, POLAR_WORDS, followed=True)
@@ -340,20 +340,20 @@ class RS274Interpreter(Interpreter[RS274Unit]):
                 self.control.resume(POLAR_WORDS)
 
     def calls_behind(self, block: Block, codes: Codes) -> bool:
-        """Whether something is called behind the motion of the block, or P of M99 says where to go on."""
+        """Whether a call follows the motion of the block, or P of M99 says where to continue."""
         return codes.call is not None and (codes.call != RETURN or "P" in block.values)
 
     def move(self, block: Block, codes: Codes, motion: int) -> None:
-        """The motion of a block; behind the pieces of one a subprogram would be called in between.
+        """Make the motion of a block; it stays whole if a call follows, which would be executed after its first piece.
 
-        P of an arc, which its pieces have not, may be that of an M code, too.
+        It also stays whole if P of an arc, which its pieces lack, may belong to an M code, too.
         """
         shared = motion in ARCS and "P" in block.values and self.flow.unit.plan(self.flow.block - 1).template.m_codes
         with self.control.in_one_piece() if shared or self.calls_behind(block, codes) else nullcontext():
             self.move_axes(block, codes, motion)
 
     def move_axes(self, block: Block, codes: Codes, motion: int) -> None:
-        """The motion of a block alone."""
+        """Make the motion of a block."""
         if MACHINE in codes.g.values():
             in_machine_coordinates(self.control, block, motion)
         else:
@@ -372,7 +372,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             self.control.modal.cycle.initial = None
 
     def after(self, codes: Codes, block: Block) -> bool:
-        """What a block does last: M2, M30, M98, M99. True if the program ends."""
+        """Execute the last actions of a block: M2, M30, M98, M99; returns whether the program ends."""
         if codes.stop in PROGRAM_ENDS:
             return True
         if codes.call == CALL:

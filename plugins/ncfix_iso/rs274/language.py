@@ -1,7 +1,7 @@
-"""The RS274 family as a `WrittenLanguage`: LinuxCNC, plain ISO code and their like.
+"""The RS274 family as a `WrittenLanguage`: LinuxCNC, plain ISO code and similar languages.
 
-Some of their like say the codes of this family in words: MOVE X=10 FEED=500 for G1 X10 F500. They are read by their
-own grammar, with `Dialect.keywords`. Every line that is put in says its motion, as they have no motion in force.
+Some languages express the codes of this family in words: MOVE X=10 FEED=500 for G1 X10 F500. They have their own
+grammar, with `Dialect.keywords`. Each inserted line states its motion, because these languages have no modal motion.
 """
 
 from __future__ import annotations
@@ -49,20 +49,20 @@ if TYPE_CHECKING:
 
 
 MAY_REPEAT = frozenset("GM")
-"""The addresses that may stand several times in a block."""
+"""Addresses that may occur several times in a block."""
 
 NO_KEYWORD = "the correction needs a word for {}, and the language has none"
 NO_TREE = "the grammar has to make a tree of words and values, as common.lark does, and made"
 
 PRODUCT = re.compile(r"#[^(;\[]*(?P<operator>\*)\d+(?=;|$)")
-"""A parameter, and behind it outside brackets what a check number looks like.
+"""A parameter, followed outside brackets by something that looks like a checksum.
 
-`X#1*2` would be read as X#1 and a check number, which no program with parameters has: it is refused.
+`X#1*2` would be read as X#1 and a checksum. Programs with parameters have none: it is refused.
 """
 
 
 def parse_block(dialect: Dialect, text: str) -> Parsed:
-    """One block, by the grammar and the rules that a grammar cannot say; raises `BlockError`."""
+    """Parse one block by the grammar and the rules that a grammar cannot express; raises `BlockError`."""
     squeezed = squeeze(text)
     parsed = parsed_words(dialect, text, squeezed)
     if product := PRODUCT.search(squeezed.code):
@@ -76,7 +76,7 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
 def parsed_words(
     dialect: Dialect, text: str, squeezed: UnspacedBlock, maker: type[TreeBuilder] | None = None
 ) -> Parsed:
-    """One block, by the grammar alone; raises `BlockError`, and NCF507 where a plugin's grammar makes no such tree."""
+    """Parse one block by the grammar alone. `BlockError` if it fails; NCF507 if a plugin's grammar makes a bad tree."""
     try:
         tree = parse(dialect, squeezed.code)
     except UnparsedError as error:
@@ -98,7 +98,7 @@ def shown(tree: Branch) -> str:
 
 
 def check_repeats(parsed: Parsed, standby: bool = True) -> None:
-    """Refuse a word that stands twice; with `standby` not the tool that M6 has brought besides the one it changes."""
+    """Refuse a word that occurs twice; with `standby`, M6 may name a second tool, to be prepared."""
     seen: set[str] = set()
     may = MAY_REPEAT | {"T"} if standby and TOOL_CHANGE in parsed.template.m_codes else MAY_REPEAT
     for word in parsed.template.words:
@@ -108,27 +108,27 @@ def check_repeats(parsed: Parsed, standby: bool = True) -> None:
 
 
 def writable(program: Program, block: int) -> Layout | None:
-    """The layout of a block of words, None for flow control and text that is passed over."""
+    """The layout of a block of words; None for flow control and opaque text."""
     return None if has_free_text(program, block) else layout_of(program, block)
 
 
 def plain(program: Program) -> Spelling:
-    """Numbers as they come, with a point in the place of formulas."""
+    """The spelling of numbers: unsigned unless the dialect signs them, with a point in place of expressions."""
     return Spelling(signed=program.dialect.signed)
 
 
 def has_keywords(dialect: Dialect) -> bool:
-    """Whether blocks of a dialect look otherwise than letters with numbers."""
+    """Whether blocks of a dialect are written otherwise than with letters and numbers."""
     return bool(dialect.keywords or dialect.assign or dialect.signed)
 
 
 def reads_codes(dialect: Dialect) -> bool:
-    """Whether blocks of a dialect may have G codes as well as its keywords."""
+    """Whether blocks of a dialect may contain G codes besides its keywords."""
     return any(terminal.name.endswith("CODE") for terminal in parser(dialect.grammar).terminals)
 
 
 class KeywordWriter(BlockWriter):
-    """Writes one motion into one block, with the keywords of the dialect for codes and addresses."""
+    """Writes one motion into one block, with the dialect's keywords for codes and addresses."""
 
     @cached_property
     def spelled(self) -> dict[str, str]:
@@ -139,7 +139,7 @@ class KeywordWriter(BlockWriter):
         return super()._cased(self.spelled.get(address, address)) + self.program.dialect.assign
 
     def _code(self, number: str) -> str:
-        """A G code as the language says it; a conflict where it has no word for that."""
+        """A G code in the words of the language; a conflict if it has none."""
         if not self.program.dialect.keywords:
             return super()._cased("G") + number
         word = self.spelled.get(f"G{number}", "")
@@ -156,7 +156,7 @@ class KeywordWriter(BlockWriter):
             super()._restate(word, number)
 
     def _opening(self, wanted: int) -> list[str]:
-        """What a further line begins with: the motion, as nothing is in force there."""
+        """The beginning of an inserted line: its motion, because these languages have no modal motion."""
         if not self.program.dialect.keywords:
             return super()._opening(wanted)
         self.code = self.code if self.target.arcs is None else wanted
@@ -171,13 +171,13 @@ class KeywordWriter(BlockWriter):
 
 
 def writer_of(program: Program, block: int, layout: Layout, target: Target, spelling: Spelling) -> BlockWriter:
-    """What writes a motion of one block."""
+    """The writer of a block's motion."""
     kind = KeywordWriter if has_keywords(program.dialect) else BlockWriter
     return kind(program, block, layout, target, spelling)
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
-    """What is needed to write motions like that of a block many at a time; None if they need `BlockWriter`."""
+    """What is needed to write motions of this shape many at a time; None if they need `BlockWriter`."""
     moving = any(word.address in AXIS_LETTERS for word in program.template_of(block).words)
     layout = writable(program, block) if moving and not has_keywords(program.dialect) else None
     found = None if layout is None else bulk_layout(program, block, layout)
@@ -187,7 +187,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
 
 
 def unroll(interpreter: RS274Interpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
-    """See `FollowedLanguage`; raises SourceError where no flat program can say what is executed."""
+    """See `FollowedLanguage`; raises SourceError if the program cannot be written out flat."""
     from ncfix_iso.rs274.flatten import RS274Flattener
 
     if has_keywords(interpreter.dialect):

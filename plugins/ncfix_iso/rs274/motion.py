@@ -1,5 +1,5 @@
-"""Motions other than arcs and cycles: where the axis words of a block lead, as commands, which of the axes are then
-known, and what the motion codes make of that. A word that is absent leaves its axis where it is.
+"""Motions other than arcs and cycles: the commands to which the axis words of a block lead, which axes are known
+afterwards, and the steps of the motion codes. An axis without a word stays where it is.
 
 Source: LinuxCNC documentation, "G-code overview", "F", "G53", "G90, G91", "G93, G94, G95".
 """
@@ -21,13 +21,13 @@ POLAR = "NCF223"
 
 
 def destination(control: RS274Control, block: Block) -> MotionEnd:
-    """Where a motion of this block ends."""
+    """The end of this block's motion."""
     end = words_destination(control, block)
     return MotionEnd(end.target, end.unknown | unnamed(control, block)) if control.unnamed else end
 
 
 def unnamed(control: RS274Control, block: Block) -> UnknownAxes:
-    """Axes of the plane that cannot be known until both are named, after a rotation has gone on or off (G68, G69)."""
+    """Why axes of the plane are unknown until both are named, after a rotation began or ended (G68, G69)."""
     named = {index for index in control.unnamed if block.axes >> index & 1}
     if not named:
         return {}
@@ -42,7 +42,7 @@ def unnamed(control: RS274Control, block: Block) -> UnknownAxes:
 
 
 def words_destination(control: RS274Control, block: Block) -> MotionEnd:
-    """Where the words of a block lead."""
+    """The end to which the words of a block lead."""
     incremental = control.modal.incremental
     if not incremental and not control.offset_checked:
         check_system(control)
@@ -63,7 +63,7 @@ def words_destination(control: RS274Control, block: Block) -> MotionEnd:
 
 
 def unknown_after(control: RS274Control, block: Block, incremental: bool, before: UnknownAxes) -> UnknownAxes:
-    """Which axes are not known where the motion ends, of those that were not `before`."""
+    """Reasons for unknown axes at the end of a motion; `before`: those at its start."""
     if not (before or control.composed.unknown or block.unknown):
         return before
     unknown = dict(before)
@@ -80,7 +80,7 @@ def unknown_after(control: RS274Control, block: Block, incremental: bool, before
 
 
 def rotated_destination(control: RS274Control, block: Block, incremental: bool) -> MotionEnd:
-    """`destination` in a rotated frame, where one word moves several axes."""
+    """Like `words_destination`, in a rotated frame, where one word moves several axes."""
     program = control.program_position()
     for letter, value in block.values.items():
         if letter in INDEX:
@@ -90,13 +90,13 @@ def rotated_destination(control: RS274Control, block: Block, incremental: bool) 
 
 
 def rotated_end(control: RS274Control, block: Block, incremental: bool, target: Vector) -> MotionEnd:
-    """The end of a motion at `target` in a rotated frame: an axis is known if all that it is made of is."""
+    """The end of a motion at `target` in a rotated frame: an axis is known if all axes that it depends on are."""
     own = unknown_after(control, block, incremental, control.lost_in_frame())
     return MotionEnd(target, control.axes_of(own), own)
 
 
 def cartesian(control: RS274Control, block: Block) -> Block:
-    """A block with polar words `@` (radius) and `^` (angle), in X and Y of the program's frame, absolute."""
+    """A block with polar words `@` (radius) and `^` (angle) converted to X and Y of the program's frame, absolute."""
     program = [
         nominal(control.coordinate(index)) if index in (X, Y) or block.axes >> index & 1 else 0.0 for index in range(9)
     ]
@@ -110,7 +110,7 @@ def cartesian(control: RS274Control, block: Block) -> Block:
 
 
 def by_radius_and_angle(control: RS274Control, block: Block, x: float, y: float) -> tuple[float, float]:
-    """Where polar words lead from a place, in program units; what a block does not say stays, or is added in G91."""
+    """X and Y of polar words, from a position, in program units; what is omitted stays, or in G91 is added."""
     if control.modal.plane.code != 170:
         raise Fault(POLAR, "polar coordinates are for the plane G17 only")
     if block.values.keys() & {"X", "Y"}:
@@ -126,7 +126,7 @@ def by_radius_and_angle(control: RS274Control, block: Block, x: float, y: float)
 
 
 def machine_destination(control: RS274Control, block: Block) -> MotionEnd:
-    """The command at which a motion in machine coordinates (G53) ends."""
+    """The end of a motion in machine coordinates (G53)."""
     named = [letter for letter in block.values if letter in INDEX]
     axes = {INDEX[letter]: control.scale[INDEX[letter]] * block.values[letter] for letter in named}
     return led_in_machine(control, axes, {INDEX[letter]: RUNTIME for letter in named if letter in block.unknown})
@@ -136,7 +136,7 @@ NO_FEED = "NCF225"
 
 
 def feed_mode(control: RS274Control, block: Block, code: int) -> None:
-    """G93, G94, G95. In LinuxCNC a feed per minute or revolution has to be given anew after its code."""
+    """G93, G94, G95. In LinuxCNC the feed per minute or revolution must be given again after the code."""
     mode = code // 10
     if mode != control.modal.feed_mode or (control.rules.strict and mode != FeedMode.INVERSE_TIME):
         control.modal.feed = math.nan
@@ -157,7 +157,7 @@ def speed(control: RS274Control, block: Block, code: int) -> None:
 
 
 def check_feed(control: RS274Control, block: Block) -> None:
-    """Raise `Fault` where LinuxCNC refuses a motion for want of a feed."""
+    """Raise `Fault` if LinuxCNC would refuse a motion because the feed is missing."""
     if not control.needs_feed:
         return
     if control.modal.feed_mode == FeedMode.INVERSE_TIME:
@@ -180,10 +180,10 @@ WITH_CANCEL = "what a word {} beside G80 does differs from control to control: s
 AFTER_REFERENCE = "where the axis {} stands after the reference point is approached is not given"
 AFTER_CYCLE = "where the axis {} stands after a turning cycle is not followed"
 NO_CODE = -2
-"""Stands for the motion code of blocks with axis words before any is in force."""
+"""Motion code of blocks with axis words before any motion code is in force."""
 
 ONE_SHOT_PROBE = 310
-"""G31 holds for its block only; the motion code before it stays in force."""
+"""G31 applies to its block only; the previous motion code stays in force."""
 
 REFUSALS = {
     50: "spline (G5)",
@@ -196,7 +196,7 @@ REFUSALS = {
 
 
 def straight(control: RS274Control, block: Block, code: int) -> None:
-    """G0 and G1; with G53 in machine coordinates."""
+    """G0 and G1."""
     if code:
         check_feed(control, block)
     control.modal.motion = control.modal.straight = code
@@ -211,10 +211,10 @@ def straight(control: RS274Control, block: Block, code: int) -> None:
 
 
 def measured(control: RS274Control, block: Block, computed: frozenset[str], kind: MotionKind, code: int) -> None:
-    """A straight motion to a place of which some words are computed from what nominal probing has found.
+    """Make a straight motion whose words are partly computed from nominal probing results.
 
-    The control goes on computing them. A block put in would have to do so too, and so would a word for such an axis in
-    a later block: neither is written.
+    The control will compute them at run time. An inserted block, or a later word for such an axis, would have to do so,
+    too: neither is written.
     """
     axes = mask_of(INDEX[letter] for letter in computed)
     end = destination(control, Block(block.index, block.values, block.unknown - computed, block.axes))
@@ -225,7 +225,7 @@ def measured(control: RS274Control, block: Block, computed: frozenset[str], kind
 
 
 def in_machine_coordinates(control: RS274Control, block: Block, code: int) -> None:
-    """G53 with G0 or G1; where neither is in force, ISO controls go there in rapid."""
+    """G53 with G0 or G1; if neither is in force, ISO controls move in rapid."""
     if code not in (0, 10):
         if control.rules.strict:
             raise Fault(BAD_MOTION, "G53 needs G0 or G1 in force")
@@ -245,7 +245,7 @@ def in_machine_coordinates(control: RS274Control, block: Block, code: int) -> No
 
 
 def one_way(control: RS274Control, block: Block, code: int) -> None:
-    """G60: a rapid to the words from one side (ISO controls), in one piece: the next block is none any more."""
+    """G60: a rapid that approaches its end from one side (ISO controls); it stays whole, as it acts on one block."""
     with control.in_one_piece():
         control.make(Motion(MotionKind.RAPID, block.axes, destination(control, block), 0))
 
@@ -254,7 +254,7 @@ def one_way(control: RS274Control, block: Block, code: int) -> None:
 
 
 def go_to_reference(control: RS274Control, block: Block, code: int) -> None:
-    """G28 and G30: by way of the words to the reference point, along the axes named, or along all."""
+    """G28 and G30: via the words of the block to the reference point, along the axes named, or along all."""
     name = f"G{code // 10}"
     passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(name))
     modal = control.modal.motion
@@ -269,13 +269,13 @@ def go_to_reference(control: RS274Control, block: Block, code: int) -> None:
 
 
 def goes_by_way(control: RS274Control, block: Block) -> bool:
-    """Whether the way to a reference point leads by the words of the block; increments of zero lead nowhere."""
+    """Whether the motion to a reference point goes via the words of the block; zero increments lead nowhere."""
     values = [block.values.get(LETTERS[index], 1.0) for index in words_of(block)]
     return any(values) if control.modal.incremental else bool(values)
 
 
 def reference_target(control: RS274Control, name: str, axes: int) -> MotionEnd:
-    """Where the reference point is, along the axes of the bit mask; elsewhere the position."""
+    """The end at a reference point along the axes in the bit mask; other axes stay."""
     first = REFERENCES[name]
     place, unsure = along(control, stored(control, first), axes), dict(control.unknown)
     for index in control.axis_indices:
@@ -289,7 +289,7 @@ def reference_target(control: RS274Control, name: str, axes: int) -> MotionEnd:
 
 
 def along(control: RS274Control, point: Vector, axes: int) -> Vector:
-    """The position moved to a point along some letters of the program's frame, turned as that is (LinuxCNC)."""
+    """The position moved to a point along some letters of the program's frame, rotated like the frame (LinuxCNC)."""
     if control.tcp or not control.is_rotated or axes & 3 in (0, 3):
         return [point[i] if axes >> i & 1 else value for i, value in enumerate(control.position)]
     here = control.program_position()
@@ -306,7 +306,7 @@ def assumed(control: RS274Control, name: str) -> bool:
 
 
 def save_reference(control: RS274Control, block: Block, code: int) -> None:
-    """G28.1 and G30.1: the position becomes the reference point."""
+    """G28.1 and G30.1: save the position as reference point."""
     control.use_start_positions(tuple(control.unknown))
     first = REFERENCES[f"G{code // 10}"]
     for index, value in enumerate(control.position):
@@ -317,7 +317,7 @@ def save_reference(control: RS274Control, block: Block, code: int) -> None:
 
 
 def probe(control: RS274Control, block: Block, code: int) -> None:
-    """G38.2 to G38.5, and G31 of ISO controls: towards the words until the probe switches."""
+    """G38.2 to G38.5, and G31 of ISO controls: move towards the words until the probe switches."""
     if control.rules.strict:
         if not control.modal.feed_given:
             raise Fault("NCF225", "probing, and no feed (F) is set")
@@ -340,7 +340,7 @@ def probe(control: RS274Control, block: Block, code: int) -> None:
 
 
 def probe_nominally(control: RS274Control, block: Block, end: MotionEnd, code: int) -> None:
-    """Probing that ends where the setup says; what is computed from it is computed anew at run time."""
+    """Probing that nominally ends where the setup says; at run time, results are computed anew."""
     control.knowledge.probing()
     touched = {letter: value for letter, value in (control.setup.probed or {}).items() if letter in block.values}
     if touched:
@@ -352,7 +352,7 @@ def probe_nominally(control: RS274Control, block: Block, end: MotionEnd, code: i
 
 
 def probed(control: RS274Control, motion: Motion, *, touches: bool) -> None:
-    """The motion of a probe, and the parameters in which the control leaves what it found; `touches`: for certain."""
+    """Make the motion of a probe, and set the parameters with its result; `touches`: whether it touches for certain."""
     control.make(motion)
     program = control.program_position()
     for index in range(N_LETTERS):
@@ -364,7 +364,7 @@ def probed(control: RS274Control, motion: Motion, *, touches: bool) -> None:
 
 
 def refused(control: RS274Control, block: Block, code: int) -> None:
-    """Splines and threads: the end is followed, the path is not."""
+    """Splines and threads: their end is followed, their path is not."""
     if code in (330, 331, 760):
         control.modal.motion = code
         if control.rules.strict and control.modal.spindle == 5:
@@ -381,14 +381,14 @@ def refused(control: RS274Control, block: Block, code: int) -> None:
 
 
 def end_spline(control: RS274Control, block: Block, code: int) -> None:
-    """G5.3: the spline that the G5.2 blocks described is done."""
+    """G5.3: end the spline that the G5.2 blocks described."""
     if control.modal.motion != 52:
         raise Fault(BAD_MOTION, "G5.3 ends a spline, and none was begun with G5.2")
     control.modal.motion = -1
 
 
 def turning_cycle(control: RS274Control, block: Block, code: int) -> None:
-    """G70 to G72 of turning: where it goes is written elsewhere in the program."""
+    """G70 to G72 of turning: their path is written elsewhere in the program."""
     unknown = dict(control.unknown)
     for letter in "XZ":
         if INDEX[letter] in control.axis_indices:
@@ -398,8 +398,8 @@ def turning_cycle(control: RS274Control, block: Block, code: int) -> None:
 
 
 def at_power_on(control: RS274Control, block: Block, code: int) -> None:
-    """Axis words before the first motion code: a setting of ISO controls says whether G0 or G1 is in force then
-    (Fanuc: parameter 3402). Both end at the same place; a block put in would have to name one, so none may be."""
+    """Axis words before the first motion code: a setting of ISO controls decides whether G0 or G1 is in force (Fanuc:
+    parameter 3402). Both end at the same place; an inserted block would have to name one, so none may be inserted."""
     end = destination(control, block)
     with control.in_one_piece():
         control.make(Motion(MotionKind.RAPID, block.axes, end, 0))
@@ -414,7 +414,7 @@ def dwell(control: RS274Control, block: Block, code: int) -> None:
 
 
 def cancel(control: RS274Control, block: Block, code: int) -> None:
-    """G80: no motion code is in force; on ISO controls the one before the cycle is again."""
+    """G80: end the motion code; on ISO controls the one before the cycle is in force again."""
     control.modal.motion = code if control.rules.strict else control.modal.straight
     word = "" if control.rules.strict else control.path_word(control.block_words)
     if word:

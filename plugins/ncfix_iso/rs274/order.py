@@ -1,4 +1,4 @@
-"""The order in which a control does what a block says: fixed, not as written.
+"""The fixed order in which a control executes the words of a block, independent of their order in the text.
 
 Source: LinuxCNC documentation, "G-code overview", "Order of execution".
 """
@@ -55,17 +55,17 @@ from ncfix_iso.rs274.systems import rotate_system, select_system, shift_system, 
 Step = Callable[[RS274Control, Block, int], None]
 
 FIRST: tuple[tuple[str, Step], ...] = ((groups.FEED_MODE, feed_mode),)
-"""What comes before the words F, S and T, by G group."""
+"""Steps before the words F, S and T, by G group."""
 
 WORDS: tuple[tuple[str, Step], ...] = (("F", feed), ("S", speed), ("T", select_tool), ("D", select_radius))
-"""F, S, T and D."""
+"""Steps for the words F, S, T and D."""
 
 INPUTS = 5399
-"""The parameter in which M66 leaves what it read."""
+"""Parameter that contains the value read by M66."""
 
 
 def read_input(control: RS274Control, block: Block, code: int) -> None:
-    """M66 reads an input: the value is known only at run time."""
+    """M66 reads an input, whose value is known only at run time."""
     if code == 660:
         control.parameters.assign(INPUTS, Unknown())
         control.parameters.inputs = True
@@ -76,7 +76,7 @@ M_STEPS: tuple[tuple[str, Step], ...] = (
     (groups.TOOL, change_tool),
     (groups.SPINDLE, spindle_or_state),
 )
-"""M codes, by group; those of other groups change nothing here."""
+"""Steps of M codes, by group; those of other groups have no effect here."""
 
 G_STEPS: tuple[tuple[str, Step], ...] = (
     (groups.PLANE, plane),
@@ -92,7 +92,7 @@ G_STEPS: tuple[tuple[str, Step], ...] = (
     (groups.UNFOLLOWED, unfollowed),
     (groups.ROTATION, rotate_system),
 )
-"""G codes other than motions, by group."""
+"""Steps of G codes other than motions, by group."""
 
 NON_MODAL: Mapping[int, Step] = {
     53: end_spline,
@@ -106,7 +106,7 @@ NON_MODAL: Mapping[int, Step] = {
     600: one_way,
     **dict.fromkeys((920, 921, 922, 923), shift_system),
 }
-"""Codes of the non-modal group that act after all settings; G4 acts before them, G53 with the motion."""
+"""Steps of non-modal codes after all settings; G4 is executed before them, G53 with the motion."""
 
 DWELL = 40
 MACHINE = 530
@@ -123,22 +123,22 @@ MOTIONS: Mapping[int, Step] = {
     **dict.fromkeys(groups.TURNING_CYCLES, turning_cycle),
     **dict.fromkeys(groups.CYCLES, cycle),
 }
-"""Motion codes."""
+"""Steps of motion codes."""
 
 
 Steps = tuple[tuple[Step, int], ...]
 
 
 def carry_out(operations: Sequence[CodeOperation], control: RS274Control, block: Block, code: int) -> None:
-    """A code of the dialect's own."""
+    """Execute a dialect's own code."""
     for operation in operations:
         operation.carry_out(control, block, partial(destination, control, block))
 
 
 def steps_of(g_codes: Mapping[str, int], m_codes: Mapping[str, int], letters: frozenset[str], rules: Rules) -> Steps:
-    """What a block does before its motion, in order: steps with their codes.
+    """The steps of a block before its motion, in order, with their codes.
 
-    `g_codes` and `m_codes` by group; `letters` the addresses of the block's words.
+    `g_codes` and `m_codes` by group; `letters`: addresses of the block's words.
     """
     own = rules.steps
     steps = [(step, g_codes[group]) for group, step in FIRST if group in g_codes]

@@ -1,12 +1,12 @@
-"""The parameters of a program, numbered, named in their scopes, and those the control itself keeps up to date; and the
-expressions of RS274NGC, as LinuxCNC computes them.
+"""Parameters of a program (numbered, named by scope, and those maintained by the control), and RS274NGC expressions as
+computed by LinuxCNC.
 
-A value that exists only at run time (a probed position, an input) has a nominal value here, what a dry run would give,
-and is `Unknown`: so is whatever is computed from it.
+A value that exists only at run time (a probed position, an input) has a nominal value here, as in a dry run, and is
+`Unknown`; so is everything computed from it.
 
-Source: LinuxCNC documentation, "G-code overview", "Binary operators" and "Functions"; angles are degrees. Since
-version 2.9.1 numbers are equal that differ by less than 1e-6, and `le` and `ge` hold for equal ones. Before, `eq` and
-`ne` had 0.0001, and `le` and `ge` were exact. `lt` and `gt` are exact in all (LinuxCNC, pull request 2525).
+Source: LinuxCNC documentation, "G-code overview", "Binary operators" and "Functions"; angles in degrees. Since version
+2.9.1 numbers that differ by less than 1e-6 are equal, also for `le` and `ge`. Earlier the limit was 0.0001 for `eq` and
+`ne`, and `le` and `ge` were exact. `lt` and `gt` are exact in all versions (LinuxCNC, pull request 2525).
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from ncfix.text.tree import NamedParameter, NumberedParameter
 from ncfix.values import mutable
 
 EQUAL = 1e-6
-"""Two numbers are equal that differ by less."""
+"""Difference below which two numbers are equal."""
 
 FORMERLY_EQUAL = 1e-4
-"""The same for `eq` and `ne` before 2.9.1."""
+"""The same for `eq` and `ne` before version 2.9.1."""
 
 
 def modulo(left: float, right: float) -> float:
@@ -45,11 +45,11 @@ def modulo(left: float, right: float) -> float:
 
 
 FARTHEST = 2**31
-"""From here on a number is no index, label or count."""
+"""Bound of indices, labels and counts."""
 
 
 def whole(value: float, what: str) -> int:
-    """A number that must be a whole one, as an index or a label; LinuxCNC allows 0.0001 off."""
+    """A number that must be an integer, such as an index or a label; LinuxCNC accepts a deviation of 0.0001."""
     if not abs(value) < FARTHEST:
         raise Fault(ARITHMETIC, f"{what} is {value:g}, and no control counts so far")
     nearest = math.floor(value)
@@ -61,7 +61,7 @@ def whole(value: float, what: str) -> int:
 
 
 def number_of(value: Value) -> int:
-    """The number of a parameter."""
+    """The number of a parameter as an integer."""
     return whole(nominal(value), "the number of a parameter")
 
 
@@ -90,13 +90,13 @@ FUNCTIONS_OF_PARAMETERS: dict[str, tuple[Callable[..., float], int]] = {
 
 
 class ParameterExpressions(Expressions):
-    """RS274NGC: `#1`, `#<name>`, `[...]`; scopes have `parameters`."""
+    """Expressions of RS274NGC: `#1`, `#<name>`, `[...]`; the scope has `parameters`."""
 
     operators = OPERATORS
     functions = FUNCTIONS_OF_PARAMETERS
 
     def in_doubt(self, operator: str, left: float, right: float) -> bool:
-        """Whether a comparison comes out otherwise in older versions of the control."""
+        """Whether older versions of the control give another result for a comparison."""
         match operator:
             case "eq" | "ne":
                 return EQUAL <= abs(left - right) < FORMERLY_EQUAL
@@ -107,7 +107,7 @@ class ParameterExpressions(Expressions):
         return False
 
     def numbered(self, index: Evaluate) -> Evaluate:
-        """`#1`, `#[...]`; which one may itself be unknown."""
+        """`#1`, `#[...]`; its number may be unknown, too."""
 
         def evaluate(scope: object) -> Value:
             which = index(scope)
@@ -133,10 +133,10 @@ compiled = ParameterExpressions().compiled
 
 
 N_PARAMETERS = 5603
-"""Numbered parameters are 1 up to here."""
+"""Upper bound (exclusive) of the numbers of parameters, which begin at 1."""
 
 LOCAL = range(1, 31)
-"""The numbered parameters that each subprogram has of its own."""
+"""Numbered parameters that each subprogram has for itself."""
 
 READ_ONLY = frozenset((*range(5400, 5414), *range(5420, 5429), 5601, 5602))
 UNDEFINED = "NCF211"
@@ -145,10 +145,10 @@ OUT_OF_RANGE = "NCF213"
 
 
 Key = int | str
-"""What names a parameter: its number or its name."""
+"""Identifies a parameter: its number or its name."""
 
 OF_THE_MACHINE = ("_hal[", "_ini[")
-"""How the names of the machine's pins begin, and of the entries of its configuration: known at run time only."""
+"""Beginnings of the names of machine pins and configuration entries, which are known only at run time."""
 
 
 Store = dict[Key, Value]
@@ -160,14 +160,14 @@ class NumberedParameters:
     """All parameters.
 
     numbers     numbered parameters that have been set
-    scopes      named parameters: the program's own and global ones first, then those of each call
+    scopes      named parameters: global ones and those of the program first, then those of each call
     live        numbered parameters that the control computes when they are read
     predefined  named parameters of that kind
-    persistent  called with the number before a parameter between 5161 and 5390 is read: it may be lacking
-    unset       the value of another parameter that the program has not set
+    persistent  called with the number before a parameter from 5161 to 5390 is read, which may be missing in the setup
+    unset       returns the value of any other parameter that the program has not set
     returned    value of the last `return`, and whether it gave one
-    inputs      a pin of the machine or an input (M66) has been read: what is computed may depend on it
-    changes     how often a parameter has got another value, or one has been read that the control computes
+    inputs      whether a pin of the machine or an input (M66) was read, on which results may depend
+    changes     number of changed values, and of reads of parameters computed by the control
     """
 
     numbers: Store = field(default_factory=dict)
@@ -211,19 +211,19 @@ class NumberedParameters:
         return scope[name]
 
     def exists(self, key: Key) -> bool:
-        """Whether the parameter has been defined."""
+        """Whether the parameter is defined."""
         if isinstance(key, int):
             return 1 <= key < N_PARAMETERS
         return key in self.predefined or key in self.scope_of(key)
 
     def scope_of(self, name: str) -> Store:
-        """Names that begin with `_` are global, others belong to the subprogram."""
+        """The scope of a name: global if it begins with `_`, else of the subprogram."""
         return self.scopes[0 if name.startswith("_") else -1]
 
     # -- writing ------------------------------------------------------------------------------------------------------
 
     def check_writable(self, key: Key) -> None:
-        """Raise `Fault` if the program may not assign to the parameter."""
+        """Raise `Fault` if the program must not assign to the parameter."""
         if isinstance(key, int) and not 1 <= key < N_PARAMETERS:
             raise Fault(OUT_OF_RANGE, f"there is no parameter #{key}", f"they are #1 to #{N_PARAMETERS - 1}")
         if key in READ_ONLY or key in self.predefined:
@@ -231,23 +231,23 @@ class NumberedParameters:
             raise Fault(READ_ONLY_FAULT, f"{name} cannot be assigned to: the control sets it itself")
 
     def store_of(self, key: Key) -> Store:
-        """Where a parameter is kept."""
+        """The store of a parameter."""
         return self.numbers if isinstance(key, int) else self.scope_of(key)
 
     def assign(self, key: Key, value: Value) -> None:
-        """Set a parameter; what is unknown depends on this parameter from here on."""
+        """Set a parameter; an unknown value then depends on this parameter."""
         store, number = self.store_of(key), nominal(value)
         self.changes += key not in store or nominal(store[key]) != number
         store[key] = Unknown(f"#{key}", number) if isinstance(value, Unknown) else number
 
     def is_unknown(self, number: int) -> bool:
-        """Whether a numbered parameter is known only at run time."""
+        """Whether the value of a numbered parameter is known only at run time."""
         return isinstance(self.numbers.get(number), Unknown)
 
     # -- subprograms --------------------------------------------------------------------------------------------------
 
     def locals(self) -> list[Value]:
-        """#1 to #30."""
+        """The values of #1 to #30."""
         return [self.numbers.get(index, 0.0) for index in LOCAL]
 
     def set_locals(self, values: list[Value]) -> None:

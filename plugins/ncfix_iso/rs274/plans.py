@@ -1,6 +1,6 @@
-"""A plan for each shape of block: what its words are, which codes it has, and what is done in which order.
+"""Plans: for each block shape, its words, its codes, and the steps to execute in order.
 
-Everything that does not depend on numbers is settled once per shape, so that a block costs little when it runs.
+Everything independent of numbers is prepared once per shape, so that executing a block is fast.
 """
 
 from __future__ import annotations
@@ -40,18 +40,18 @@ from ncfix_iso.rs274.groups import TOOL_CHANGE, Rules
 from ncfix_iso.rs274.order import Step, steps_of
 
 DWELL_WORDS = "P"
-"""With G4: how long."""
+"""Words of G4 that give its duration."""
 NO_WORDS = frozenset("GMNO")
-"""Addresses that do not come as values to the steps of a block."""
+"""Addresses whose words are not passed as values to the steps of a block."""
 
 WITHOUT_WORDS = frozenset({50, 250, 260, 281, 301})
-"""Codes that some controls know without words of axes, and others with: G5 P10000 and splines, G25 and G26 of spindles
-and of working areas, G28.1 and G30.1 that keep the place and that go to one."""
+"""Codes with different meanings without and with axis words: G5 P10000 and splines, G25 and G26 of spindles and of
+working areas, G28.1 and G30.1 that save the position and that approach one."""
 SMOOTHING = 51
-"""G5.1 Q: axis words, `G5.1 Q2 X0 Y0 Z0`, say for which axes it is, and move nothing."""
+"""G5.1 Q: axis words, `G5.1 Q2 X0 Y0 Z0`, name the axes concerned, and move nothing."""
 
 CYCLE_WORDS = frozenset("DIJKLPQRUW")
-"""Words without which G70 and G71 are no cycles: of turning, and holes on a circle."""
+"""Words without which G70 and G71 are no cycles (of turning, or of holes on a circle)."""
 
 LANE_LETTERS = frozenset("FN") | INDEX.keys()
 ARC_LETTERS = frozenset("IJKR")
@@ -62,28 +62,28 @@ UNKNOWN_M = "NCF229"
 MAX_M_CODES = 4
 
 AXES_TAKEN = frozenset((100, 220, 280, 300, 310, 501, 510, 511, 520, 600, 680, 682, 683, 684, 920))
-"""G codes that take the axis words of their block for themselves, so that it has no motion."""
+"""G codes that use the axis words of their block themselves, so that it has no motion."""
 
 HARMLESS_TEXT = frozenset({UNREAD, "checksum", "command", "control character", "output", "program name", "text word"})
-"""The terminals of the grammars, as kinds of `Opaque`, that lead no axis by themselves; any other text may."""
+"""Terminals of the grammars, as kinds of `Opaque`, that move no axis; any other text may."""
 
 FIRST_SYSTEM, EXTENDED_SYSTEM = 540, 541
-"""G54, and what ISO controls make of it where the block has a P: G54.1 Pn."""
+"""G54, and the code as which ISO controls read it if the block has a P: G54.1 Pn."""
 
 P_USERS = frozenset((*(40, 100, 300, 650, 660, 661, 682), *groups.CYCLES, *(190, 970, 980, 990, 1980)))
-"""G and M codes that have a use for P."""
+"""G and M codes that use P."""
 
 
 @frozen
 class Codes:
     """The codes of a block, by group.
 
-    steps    what is done before the motion
-    motion   the motion code, if the block has one
+    steps    steps before the motion
+    motion   motion code, if the block has one
     stop     M0, M1, M2, M30, M60 in tenths
     call     M98 or M99 in tenths
-    takes    one of the codes takes the axis words
-    unknown  G codes that are not known
+    takes    whether one of the codes uses the axis words itself
+    unknown  unknown G codes
     """
 
     g: dict[str, int]
@@ -98,7 +98,7 @@ class Codes:
 
 @frozen
 class FlowLine:
-    """A flow-control line: its label, as text or as a function, its keyword, and the functions of its arguments."""
+    """A flow-control line: its label (text or function), its keyword, and the functions of its arguments."""
 
     label: str | Evaluate
     keyword: str
@@ -111,21 +111,21 @@ class RS274Plan:
     """What is done with every block of a shape.
 
     literals     (address, slot) of words with a plain number
-    fixed        addresses whose value does not come from a word of the block, see `Like`
-    pointless    addresses of words with a plain number without a decimal point, where the dialect tells them apart
+    fixed        values of addresses that the block has no word for, see `Like`
+    pointless    addresses of plain numbers without a decimal point, in dialects where that matters
     computed     words with an expression
     assignments  parameters that are set
-    code_words   G and M words whose code is computed; else `codes` are the codes
-    flow         the flow-control line that the block is
-    skip         the switches of block delete that it begins with (`/`, `/2`)
-    tape         the block is a `%`
-    unread       the block could not be read
-    command      where a command to the control itself stands (`$H` of Grbl)
-    unknown_text  where a text stands of which nobody knows what it does
+    code_words   G and M words, if one of them is computed; else `codes` are the codes
+    flow         the flow-control line of the block
+    skip         the switches of block delete at its beginning (`/`, `/2`)
+    tape         whether the block is a `%`
+    unread       whether the block could not be parsed
+    command      place of a command to the control itself (`$H` of Grbl)
+    unknown_text  place of text with unknown effect
     axes         bit mask of the axis words
-    fault        what is wrong with the codes, raised when the block runs
+    fault        error in the codes, raised when the block is executed
     lane         set if the block may go through the fast lane
-    checked      motion codes with which the words have been found to be used
+    checked      motion codes with which all words are known to be used
     """
 
     template: Template
@@ -149,14 +149,14 @@ class RS274Plan:
     checked: set[int | None] = field(default_factory=set)
 
     def span_of(self, address: str) -> Span | None:
-        """Where the word of an address stands; None of one that is written otherwise, see `Like`."""
+        """The place of the word with an address; None if it is written under another one, see `Like`."""
         return next((word.span for word in self.template.words if word.address == address), None)
 
 
 class RS274Unit(TextUnit[RS274Plan]):
-    """The text of a program, or of a subprogram file, on a machine with some axes (a bit mask of their letters).
+    """The text of a program or subprogram file, on a machine with some axes (bit mask of their letters).
 
-    flows  the blocks that are flow control, ascending
+    flows  the flow-control blocks, ascending
     """
 
     def __init__(self, program: Program, rules: Rules, axes: int, external: str = "") -> None:
@@ -181,7 +181,7 @@ class RS274Unit(TextUnit[RS274Plan]):
 
 
 def words_of(words: Sequence[Word], address: str) -> list[Word]:
-    """The words of an address."""
+    """The words with an address."""
     return [word for word in words if word.address == address]
 
 
@@ -196,7 +196,7 @@ def plan_of(template: Template, rules: Rules) -> RS274Plan:
 
 
 def take_values(plan: RS274Plan, rules: Rules) -> None:
-    """The words that come as values to the steps of the block."""
+    """Collect the words that are passed as values to the steps of the block."""
     words = plan.template.words
     standby = words_of(words, "T")[1:] if TOOL_CHANGE in plan.template.m_codes else []
     values = [word for word in words if word.address not in NO_WORDS and word not in standby]
@@ -214,7 +214,7 @@ def take_values(plan: RS274Plan, rules: Rules) -> None:
 
 
 def take_aliases(plan: RS274Plan, rules: Rules) -> None:
-    """Words that a code of the dialect's own gives to the code of the family that it stands for."""
+    """Convert the words of a dialect's own code to those of the family's code for which it stands."""
     codes = [(w.address, round(10 * w.value.value)) for w in plan.template.words if isinstance(w.value, Constant)]
     for code in codes:
         given = rules.aliases[code].given if code in rules.aliases else {}
@@ -235,7 +235,7 @@ def take_aliases(plan: RS274Plan, rules: Rules) -> None:
 
 
 def take_statements(plan: RS274Plan, rules: Rules) -> None:
-    """What the block is besides words."""
+    """Collect everything in the block other than words."""
     items = plan.template.items
     plan.assignments = tuple(assignment(item, rules) for item in items if isinstance(item, Assignment))
     plan.flow = next((flow_line(item, rules) for item in items if isinstance(item, OWordLine)), None)
@@ -247,7 +247,7 @@ def take_statements(plan: RS274Plan, rules: Rules) -> None:
 
 
 def take_codes(plan: RS274Plan, rules: Rules) -> None:
-    """The codes of the block, by group if they are plain numbers."""
+    """Collect the codes of the block; by group if they are plain numbers."""
     words = [word for word in plan.template.words if word.address in "GM"]
     plain = [(word, round(10 * word.value.value)) for word in words if isinstance(word.value, Constant)]
     if len(plain) < len(words):
@@ -260,7 +260,7 @@ def take_codes(plan: RS274Plan, rules: Rules) -> None:
 
 
 def has_words(plan: RS274Plan) -> bool:
-    """Whether words stand beside the statement of a block."""
+    """Whether a block has words besides its statement."""
     return bool(plan.letters or plan.assignments or plan.template.g_codes or plan.template.m_codes)
 
 
@@ -271,14 +271,14 @@ def flow_line(item: OWordLine, rules: Rules) -> FlowLine:
 
 
 def assignment(item: Assignment, rules: Rules) -> tuple[int | str | Evaluate, Evaluate, Span]:
-    """Target and value of an assignment; a name as it is, a number as a function."""
+    """Target and value of an assignment: a name as text, a number as function; and the place."""
     assert isinstance(item.target, NamedParameter | NumberedParameter), "this family has no arrays"
     target = item.target.name if isinstance(item.target, NamedParameter) else rules.compiled(item.target.index, "")
     return target, rules.compiled(item.value, ""), item.span
 
 
 def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], rules: Rules) -> Codes:
-    """The codes of a block by group; raises `Fault` where two exclude one another or one is not known."""
+    """The codes of a block by group; raises `Fault` if two exclude each other, or one is unknown."""
     g: dict[str, int] = {}
     m: dict[str, int] = {}
     unknown, named = [], False
@@ -322,13 +322,13 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
 
 
 def has_own(g: Mapping[str, int], m: Mapping[str, int], rules: Rules) -> bool:
-    """Whether a block has codes of the dialect's own, which may have a use for any word."""
+    """Whether a block has codes of the dialect's own, which may use any word."""
     written = {*(("G", code) for code in g.values()), *(("M", code) for code in m.values())}
     return not rules.operations.keys().isdisjoint(written) or not rules.tables.keys().isdisjoint(g.values())
 
 
 def check_words(plan: RS274Plan, codes: Codes, motion: int | None, rules: Rules) -> None:
-    """Raise `Fault` for a word that no code of a block uses, where the control does."""
+    """Raise `Fault` for a word that no code of the block uses, if the control does."""
     if not rules.strict or motion in plan.checked or motion in rules.tables or has_own(codes.g, codes.m, rules):
         return
     letter = groups.unused_word(plan.letters, motion, frozenset(codes.g.values()), frozenset(codes.m.values()))
@@ -339,18 +339,18 @@ def check_words(plan: RS274Plan, codes: Codes, motion: int | None, rules: Rules)
 
 
 def takes_axes(code: int, rules: Rules) -> bool:
-    """Whether a G code takes the axis words of its block for itself."""
+    """Whether a G code uses the axis words of its block itself."""
     own = ("G", code) in rules.operations or code in rules.tables
     return code in rules.takes or (code in AXES_TAKEN and not own)
 
 
 def is_spline(letters: frozenset[str]) -> bool:
-    """Whether a block with G5 or G5.1 is a spline, as LinuxCNC and Marlin have them: with points besides its end."""
+    """Whether a block with G5 or G5.1 is a spline, as in LinuxCNC and Marlin: with points besides its end."""
     return not letters.isdisjoint("IJ") and not letters.isdisjoint(INDEX)
 
 
 def enter(codes: dict[str, int], group: str, word: Word, code: int, rules: Rules) -> None:
-    """Note a code; raises `Fault` if its group has one already (LinuxCNC: even the same one). G80 gives way."""
+    """Enter a code in its group; raises `Fault` if there is one already (LinuxCNC: even the same). G80 gives way."""
     if group == groups.MOTION and NO_MOTION in (codes.get(group), code):
         codes[group] = code if codes.get(group, NO_MOTION) == NO_MOTION else codes[group]
         return
@@ -361,7 +361,7 @@ def enter(codes: dict[str, int], group: str, word: Word, code: int, rules: Rules
 
 
 def lane_of(plan: RS274Plan) -> Lane | None:
-    """The fast lane's view of a plan, if the block is nothing but a straight motion or an arc with plain numbers."""
+    """The plan in the fast lane's form; None unless the block is only a straight motion or arc in plain numbers."""
     codes, slots = plan.codes, dict(plan.literals)
     if codes is None or codes.m or codes.unknown or not codes.g.keys() <= {groups.MOTION} or not is_plain(plan):
         return None
@@ -379,7 +379,7 @@ def lane_of(plan: RS274Plan) -> Lane | None:
 
 
 def is_plain(plan: RS274Plan) -> bool:
-    """Whether a block has words of motions only, with plain numbers, and no place without a point that it needs."""
+    """Whether a block has only motion words with plain numbers, and no coordinate lacks a decimal point."""
     if plan.fixed or plan.unread or plan.command or plan.unknown_text or plan.computed:
         return False
     if not plan.letters <= LANE_LETTERS | ARC_LETTERS:

@@ -1,4 +1,4 @@
-"""Parameters that the control keeps itself: positions, modes, tool data.
+"""Parameters that the control maintains: positions, modes, tool data.
 
 Source: LinuxCNC documentation, "Predefined named parameters" and "Numbered parameters".
 """
@@ -15,13 +15,13 @@ from ncfix_iso.rs274.control import RS274Control
 from ncfix_iso.rs274.flow import OWords
 
 VERSION = 2.9
-"""The version of LinuxCNC that programs find: that of the interpreter which is followed."""
+"""Version of LinuxCNC that programs read: that of the interpreter on which this one is modelled."""
 
 Getter = Callable[[], Value]
 
 
 def install(control: RS274Control, flow: OWords) -> None:
-    """Give a control its own parameters."""
+    """Install the control's own parameters."""
     control.parameters.live = numbered(control)
     control.parameters.predefined = positions(control) | modes(control) | machine(control) | program(control, flow)
 
@@ -39,7 +39,7 @@ def numbered(control: RS274Control) -> dict[int, Getter]:
 
 
 def of_tool(control: RS274Control, value: float) -> Value:
-    """A value that depends on which tool is in the spindle."""
+    """A value that depends on the tool in the spindle; `Unknown` if that is known only at run time."""
     return Unknown("tool", value) if control.tools.unsure else float(value)
 
 
@@ -49,7 +49,7 @@ def number_or_zero(value: float) -> float:
 
 
 def positions(control: RS274Control) -> dict[str, Getter]:
-    """`_x` to `_w`: where the control stands in program units."""
+    """`_x` to `_w`: the current position in program units."""
     names = [f"_{letter.lower()}" for letter in LETTERS]
     return {name: partial(control.read_position, f"#<{name}>", index) for index, name in enumerate(names)}
 
@@ -91,7 +91,7 @@ def system_code(system: int) -> int:
 
 
 def machine(control: RS274Control) -> dict[str, Getter]:
-    """What the control knows of itself. `_task` is 0: the program is looked through, not run."""
+    """What the control knows of itself. `_task` is 0, because the program is previewed, not run."""
     constants = {
         "_vmajor": VERSION,
         "_vminor": 0.0,
@@ -118,7 +118,7 @@ def machine(control: RS274Control) -> dict[str, Getter]:
 
 
 def program(control: RS274Control, flow: OWords) -> dict[str, Getter]:
-    """Where in the program execution stands, and what the last subprogram returned."""
+    """The place of execution, and the value returned by the last subprogram."""
     return {
         "_line": lambda: float(flow.unit.program.line(flow.block - 1)),
         "_call_level": lambda: float(len(flow.calls)),

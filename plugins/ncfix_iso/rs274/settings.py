@@ -1,7 +1,7 @@
-"""Codes that only set something: planes, units, distances, cutter compensation, saved states, tools and their lengths.
+"""Steps of codes that only set something: planes, units, distances, cutter compensation, saved states, tools, lengths.
 
-Sources: LinuxCNC documentation, "G-codes", "M70 .. M73", "G43", "G43.1", "G43.2", "G49", "G10 L1"; G43.4, G43.5 and G44
-from the Fanuc 30i programming manual.
+Sources: LinuxCNC documentation, "G-codes", "M70 .. M73", "G43", "G43.1", "G43.2", "G49", "G10 L1"; for G43.4, G43.5 and
+G44 the Fanuc 30i programming manual.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def arc_distance(control: RS274Control, block: Block, code: int) -> None:
 
 
 def path_mode(control: RS274Control, block: Block, code: int) -> None:
-    """G61, which is exact stop on ISO controls, G61.1, which is so in LinuxCNC, G63 and G64."""
+    """G61 (exact stop on ISO controls), G61.1 (exact stop in LinuxCNC), G63 and G64."""
     control.modal.exact_stop = code == (611 if control.rules.strict else 610)
 
 
@@ -69,11 +69,11 @@ def retract(control: RS274Control, block: Block, code: int) -> None:
 
 
 NO_REGISTER = -1
-"""The D of a program that has named none: no tool has this number, so the radius is not known."""
+"""D of a program that has named none: no tool has this number, so the radius is unknown."""
 
 
 def compensation(control: RS274Control, block: Block, code: int) -> None:
-    """G40 to G42.1: the programmed contour is followed, the control offsets it."""
+    """G40 to G42.1: the programmed contour is followed, which the control offsets."""
     side = 0 if code == 400 else code // 10
     if control.rules.strict and side:
         if control.modal.compensated:
@@ -96,13 +96,13 @@ def compensation(control: RS274Control, block: Block, code: int) -> None:
 
 
 def select_radius(control: RS274Control, block: Block, code: int) -> None:
-    """D, by which ISO controls know the radius of the cutter from there on; LinuxCNC takes it beside G41 only."""
+    """D, which sets the cutter radius on ISO controls; in LinuxCNC it only counts beside G41 or G42."""
     if not control.rules.strict:
         control.tools.register = NO_REGISTER if "D" in block.unknown else round(block.values["D"])
 
 
 def unknown_code(control: RS274Control, code: int, *, moving: bool) -> None:
-    """A G code that is not known: it may change coordinates, or move."""
+    """Handle an unknown G code, which may change coordinates or move axes."""
     name = f"G{code / 10:g}"
     if control.rules.strict:
         raise Fault("NCF227", f"{name} is not a code of LinuxCNC", "if the machine remaps it, ncfix cannot follow it")
@@ -113,7 +113,7 @@ def unknown_code(control: RS274Control, code: int, *, moving: bool) -> None:
 
 
 def spindle_or_state(control: RS274Control, block: Block, code: int) -> None:
-    """M3, M4, M5, M19, and M70 to M73 that save and restore the modal state."""
+    """M3, M4, M5, M19, and M70 to M73, which save and restore the modal state."""
     match code:
         case 700 | 730:
             control.saved[-1] = Saved(copy.copy(control.modal), code == 730)
@@ -129,7 +129,7 @@ def spindle_or_state(control: RS274Control, block: Block, code: int) -> None:
 
 
 def restore(control: RS274Control, saved: Modal) -> None:
-    """Take a saved modal state into force; the motion code and canned cycle are not part of it."""
+    """Restore a saved modal state; motion code and canned cycle are not part of it."""
     now = control.modal
     restored = copy.copy(saved)
     restored.motion, restored.cycle, restored.system = now.motion, now.cycle, now.system
@@ -150,12 +150,12 @@ DIFFERS = "what G10 L{} sets differs from control to control (--dialect says whi
 
 
 def select_tool(control: RS274Control, block: Block, code: int) -> None:
-    """T: the tool that the next M6 puts into the spindle."""
+    """T: select the tool that the next M6 loads."""
     control.tools.select(whole(block.values["T"], "T"), unsure="T" in block.unknown)
 
 
 def change_tool(control: RS274Control, block: Block, code: int) -> None:
-    """M6, for which machines go where tools are changed, and M61 Qn, which only says what is in the spindle."""
+    """M6, for which machines move to their tool change position, and M61 Qn, which only names the tool."""
     if code == 610:
         control.tools.select(whole(block.get("Q", -1.0), "Q of M61"), unsure="Q" in block.unknown)
         if control.tools.selected < 0:
@@ -171,8 +171,8 @@ def change_tool(control: RS274Control, block: Block, code: int) -> None:
 def tool_offset(control: RS274Control, block: Block, code: int) -> None:
     """G43, G43.1, G43.2, G43.4, G43.5, G44 and G49.
 
-    An offset without any length (H0, G43.1 Z0) is none: how long the tool is, the one in the spindle tells. One that
-    was not given and is taken as zero is one.
+    An offset of zero length (H0, G43.1 Z0) counts as none: the tool length is then that of the tool in the spindle. An
+    offset whose length is missing and taken as zero counts as one.
     """
     tool, number, lacking = offset_of(control, block, code)
     if control.resume(BY_H_ALONE):
@@ -195,7 +195,7 @@ def tool_offset(control: RS274Control, block: Block, code: int) -> None:
 
 
 def lone_length(control: RS274Control, block: Block, code: int) -> None:
-    """H in a block without G43: another length where one is in force, elsewhere not to all controls."""
+    """H in a block without G43: changes the length if one is in force; otherwise controls differ."""
     tools, known = control.tools, "H" not in block.unknown
     if known and block.values["H"] == float(tools.offset or 0):
         return
@@ -206,7 +206,7 @@ def lone_length(control: RS274Control, block: Block, code: int) -> None:
 
 
 def offset_of(control: RS274Control, block: Block, code: int) -> tuple[Vector, int | None, bool]:
-    """What a code sets: the offset, the number of its tool (None without one), and whether its length is lacking."""
+    """The effect of a code: the offset, its tool number (None: no offset), and whether the tool's length is missing."""
     if code == 490:
         return zeros(), None, False
     if code in DYNAMIC_OFFSETS:
@@ -218,7 +218,7 @@ def offset_of(control: RS274Control, block: Block, code: int) -> tuple[Vector, i
 
 
 def offset_by_words(control: RS274Control, block: Block, *, added: bool) -> tuple[Vector, int]:
-    """G43.1: the axis words are the offset; G43.2: they, or the length of tool H, are added to it."""
+    """G43.1: the axis words are the offset. G43.2: they, or the length of tool H, are added to it."""
     tool = control.tools.vector[:]
     number = control.tools.spindle if control.tools.offset is None else control.tools.offset
     if added and "H" in block.values:
@@ -233,7 +233,7 @@ def offset_by_words(control: RS274Control, block: Block, *, added: bool) -> tupl
 
 
 def numbered_tool(control: RS274Control, block: Block) -> int:
-    """The tool that H names; without H, and with H0 in LinuxCNC, the one in the spindle."""
+    """The tool named by H; without H, and for H0 in LinuxCNC, the tool in the spindle."""
     number = whole(block.values["H"], "H") if "H" in block.values else None
     if number is not None and number < 0:
         raise Fault(BAD_LENGTH, f"H{number} is negative")
@@ -261,7 +261,7 @@ def length_of(control: RS274Control, number: int) -> float:
 def set_data(control: RS274Control, block: Block, code: int) -> None:
     """G10: L2 and L20 set a coordinate system, L1, L10 and L11 a tool.
 
-    Where controls differ: P0 is the system in force or the external one, and in G91 words are set or added.
+    Controls differ: P0 is the system in force or the external one, and in G91 words are set or added.
     """
     kind = whole(block.get("L", -1.0), "L of G10")
     if block.unknown & {"L", "P"}:
@@ -278,7 +278,7 @@ def set_data(control: RS274Control, block: Block, code: int) -> None:
 
 
 def set_tool(control: RS274Control, block: Block, kind: int) -> None:
-    """G10 L1: the Z word is the tool's length; L10, L11: it is what Z is to be called with that tool."""
+    """G10 L1: the Z word is the tool length. L10, L11: it is the Z coordinate that the position gets with that tool."""
     number = whole(block.get("P", -1.0), "P of G10")
     if number < 1:
         raise Fault(BAD_G10, "P of G10 L1, L10 and L11 is a tool number")

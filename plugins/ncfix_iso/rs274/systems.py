@@ -1,9 +1,9 @@
-"""Coordinate systems, and what shifts or turns all of them: G54 to G59.3, G10 L2 and L20 that set them, G52, G92, and
-G68 of ISO controls. None of it moves the machine.
+"""Coordinate systems and their common shifts and rotations: G54 to G59.3, G10 L2 and L20, G52, G92, and G68 of ISO
+controls. None of these moves the machine.
 
-Parameters hold offsets in mm and degrees: #5221 is X of G54, 20 numbers further that of G55, #5230 its rotation.
+Parameters contain offsets in mm and degrees: #5221 is X of G54, 20 numbers further that of G55, #5230 its rotation.
 Sources: LinuxCNC documentation, "Coordinate systems", "G10 L2", "G10 L20", and "G52", "G92", which are one shift there;
-for G52 and G92 of ISO controls, which are two, and for G68 and G69 the Fanuc 30i programming manual.
+for G52 and G92 of ISO controls, which are two shifts, and for G68 and G69, the Fanuc 30i programming manual.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ from ncfix_iso.rs274.parameters import whole
 
 SYSTEM_NAMES = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 SHIFT = 5211
-"""The parameter of the X shift of G92."""
+"""Parameter with the X shift of G92."""
 
 REFERENCES = {"G28": 5161, "G30": 5181}
-"""The parameters of X of the reference points."""
+"""Parameters with X of the reference points."""
 
 BAD_G10 = "NCF222"
 NO_PRESET = "G92.1 that names no axis, another value than zero, or stands under a tool offset is not followed"
@@ -62,7 +62,7 @@ UNFOLLOWED = {
     684: ("tilt", "a tilted plane (G68.4)"),
     2680: ("feature", "a feature coordinate system (G268)"),
 }
-"""Codes of ISO controls that change coordinates in a way that is not followed: what they switch on, in words."""
+"""Codes of ISO controls that change coordinates in a way that is not followed: the mode, and its name in messages."""
 
 ENDS = {
     150: "polar",
@@ -73,20 +73,20 @@ ENDS = {
     690: "tilt",
     2690: "feature",
 }
-"""The codes that end them."""
+"""Codes that end these modes."""
 
 ROTATED = "rotation"
-"""What a rotation in the plane that is not certain suspends, until G69."""
+"""Mode that suspends motions while a rotation in the plane is uncertain, until G69."""
 AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
 
 
 def first_parameter(system: int) -> int:
-    """The parameter that holds X of a coordinate system, 1 for G54."""
+    """The parameter with X of a coordinate system, 1 for G54."""
     return 5201 + 20 * system
 
 
 def load_setup(control: RS274Control) -> None:
-    """Fill the parameters with what the setup gives, and switch G54 on."""
+    """Set the parameters from the setup, and bring G54 into force."""
     tables = [(control.setup.work_offsets, name, first_parameter(i)) for i, name in enumerate(SYSTEM_NAMES, 1)]
     tables += [(control.setup.references, code, first) for code, first in REFERENCES.items()]
     for table, name, first in tables:
@@ -99,7 +99,7 @@ def load_setup(control: RS274Control) -> None:
 
 
 def parameter_key(name: str) -> int | str:
-    """The parameter that a setup names, `#100` or `#<name>`."""
+    """The number or name of a parameter as written in the setup, `#100` or `#<name>`."""
     bare = name.strip().lstrip("#")
     return int(bare) if bare.isdigit() else bare.strip("<>").replace(" ", "").lower()
 
@@ -112,13 +112,13 @@ def stored(control: RS274Control, first: int) -> Vector:
 
 
 def store(control: RS274Control, first: int, index: int, value: float, unknown: bool) -> None:
-    """One number of a position, mm or rad, into its parameter; nominal if it is unknown."""
+    """Store one number of a position, mm or rad, in its parameter; as a nominal value if it is unknown."""
     degrees = value / DEGREE if control.rotary[index] else value
     control.parameters.assign(first + index, Unknown("", degrees) if unknown else degrees)
 
 
 def is_given(control: RS274Control, first: int, index: int) -> bool:
-    """Whether a parameter of a coordinate system or reference point has been given by setup or program."""
+    """Whether a parameter of a coordinate system or reference point was given by the setup or the program."""
     return first + index in control.parameters.numbers
 
 
@@ -131,22 +131,22 @@ def words_of(block: Block) -> list[int]:
 
 
 def moved_while_turned(control: RS274Control, what: str) -> None:
-    """The origin is moved while coordinates are turned, mirrored or tilted: refused until they are not.
+    """Refuse motions from when the origin moves in rotated, mirrored or tilted coordinates until these end.
 
-    LinuxCNC knows only turns of the work offset itself, and what they do.
+    LinuxCNC only has rotations of the work offset itself, whose effect is known.
     """
     if not control.rules.strict and (is_turned(control) or control.tilted):
         control.suspend(TURNED, MOVED_WHILE_TURNED.format(what))
 
 
 def is_turned(control: RS274Control) -> bool:
-    """Whether the program has turned or mirrored coordinates, besides the turn of the work offset."""
+    """Whether the program has rotated or mirrored coordinates, apart from the rotation of the work offset."""
     frames = control.frames
     return not frames.plane.rotation == frames.rotation.rotation == frames.mirror.rotation == IDENTITY
 
 
 def turned_back(control: RS274Control) -> None:
-    """Coordinates are no longer turned: where the axes stand after an origin that was moved is not known."""
+    """End the refusal of `moved_while_turned` if coordinates are no longer rotated; axis positions are then unknown."""
     if not (is_turned(control) or control.tilted) and control.resume(TURNED):
         control.lose(control.axis_indices, AFTER_TURNED)
 
@@ -160,7 +160,7 @@ def select_system(control: RS274Control, block: Block, code: int) -> None:
 
 
 def take_system(control: RS274Control, block: Block, code: int) -> None:
-    """Take another work offset into force, if it is another."""
+    """Bring a work offset into force, if it differs from the present one."""
     if code == 541:
         extended_system(control, block)
         return
@@ -171,7 +171,7 @@ def take_system(control: RS274Control, block: Block, code: int) -> None:
 
 
 def activate(control: RS274Control, system: int) -> None:
-    """Take a coordinate system's offset and rotation into force."""
+    """Bring a coordinate system's offset and rotation into force."""
     control.modal.system = system
     turn, frames = turn_of(control, system), control.frames
     if turn != frames.datum.rotation and (any(frames.additive.shift[:2]) or any(frames.local.shift[:2])):
@@ -189,7 +189,7 @@ def turn_of(control: RS274Control, system: int) -> Rotation:
 
 
 def compose(control: RS274Control) -> None:
-    """Take frames into force, and note along which letters work offset and G92 are known only at run time."""
+    """Bring frames into force, and record axes whose work offset or G92 shift is known only at run time."""
     frames = control.frames
     if not control.probes_nominally:
         is_unknown, first = control.parameters.is_unknown, first_parameter(control.modal.system)
@@ -221,7 +221,7 @@ def extended_system(control: RS274Control, block: Block) -> None:
 
 
 def check_system(control: RS274Control) -> None:
-    """The coordinate system in force is used: it is given, or lacking."""
+    """Require that the coordinate system in force is given, because it is used; record it as missing if not."""
     control.offset_checked = True
     name = SYSTEM_NAMES[control.modal.system - 1]
     first = first_parameter(control.modal.system)
@@ -230,7 +230,7 @@ def check_system(control: RS274Control) -> None:
 
 
 def before_persistent(control: RS274Control, number: int) -> None:
-    """A parameter between 5161 and 5390 is read: if it is one that the setup should give, it has to be there."""
+    """Before a parameter from 5161 to 5390 is read: record it as missing if the setup should give it and does not."""
     if number in control.parameters.numbers:
         return
     system, axis = divmod(number - 5221, 20)
@@ -247,7 +247,7 @@ def before_persistent(control: RS274Control, number: int) -> None:
 
 
 def set_system(control: RS274Control, block: Block, *, at_position: bool) -> None:
-    """G10 L2 and L20: the axis words are the new offset, or what the present position is to be called."""
+    """G10 L2 and L20: the axis words are the new offset, or the coordinates that the present position gets."""
     system = whole(block.get("P"), "P of G10") or control.modal.system
     if not 1 <= system <= len(SYSTEM_NAMES):
         raise Fault(BAD_G10, f"there is no coordinate system P{system}", f"P is 0 to {len(SYSTEM_NAMES)}")
@@ -273,7 +273,7 @@ def set_system(control: RS274Control, block: Block, *, at_position: bool) -> Non
 
 
 def origin_for_position(control: RS274Control, block: Block, system: int, origin: Vector) -> tuple[Vector, UnknownAxes]:
-    """The origin with which the control stands at the words of the block in that system, and where it is doubtful."""
+    """The origin with which the present position has the words' coordinates, and reasons where it is uncertain."""
     turn = turn_of(control, system)
     involved = {*words_of(block), *((X, Y) if turn is not IDENTITY and block.axes & 3 else ())}
     control.use_start_positions(tuple(involved))
@@ -296,7 +296,7 @@ LOCAL, BY_POSITION, CANCELLED, RESTORED = 520, 920, 921, 923
 
 
 def shift_system(control: RS274Control, block: Block, code: int) -> None:
-    """G52 and G92: shift all coordinate systems, by the words or so that the position gets their values."""
+    """G52 and G92: shift all coordinate systems, by the words, or so that the position gets their values."""
     linuxcnc = control.rules.strict
     if code == CANCELLED and block.axes and not linuxcnc:
         preset_system(control, block, code)
@@ -330,7 +330,7 @@ def shift_system(control: RS274Control, block: Block, code: int) -> None:
 
 
 def take_shift(control: RS274Control, code: int) -> None:
-    """G92.1, G92.2, which also keeps the shift for G92.3, and that: the shift is no longer in force, or it is again."""
+    """G92.1 and G92.2 (which keeps the shift for G92.3) switch the shift off; G92.3 switches it on again."""
     moved_while_turned(control, "G92")
     again = code == RESTORED
     before, doubtful = control.frames.additive.shift, {*control.composed.unknown}
@@ -345,7 +345,7 @@ def take_shift(control: RS274Control, code: int) -> None:
 
 
 def preset_system(control: RS274Control, block: Block, code: int) -> None:
-    """G92.1 X0 of ISO controls: along the axes named no shift (G52, G92) is in force any more."""
+    """G92.1 X0 of ISO controls: cancel the shifts (G52, G92) along the axes named."""
     named, offset = words_of(block), any(control.tools.vector) or control.modal.compensated
     if not named or offset or block.unknown or any(block.values[LETTERS[index]] for index in named):
         control.refuse_rest(NO_PRESET)
@@ -367,7 +367,7 @@ def preset_system(control: RS274Control, block: Block, code: int) -> None:
 
 
 def set_local(control: RS274Control, block: Block, *, cancelled: bool) -> None:
-    """G52 of ISO controls, which is not the shift of G92; G92 takes it away along the axes that it names."""
+    """G52 of ISO controls, which is separate from the shift of G92; G92 cancels it along the axes that it names."""
     local, unknown = [*control.frames.local.shift], dict(control.frames.local.unknown)
     for index in words_of(block):
         local[index] = 0.0 if cancelled else control.scale[index] * block.values[LETTERS[index]]
@@ -380,7 +380,7 @@ def set_local(control: RS274Control, block: Block, *, cancelled: bool) -> None:
 
 
 def set_shift(control: RS274Control, block: Block, *, from_position: bool) -> None:
-    """The shift that the words ask for."""
+    """Set the shift asked for by the words."""
     shift = [*control.frames.additive.shift]
     if from_position:
         control.use_start_positions(tuple(control.unknown) if control.is_rotated else words_of(block))
@@ -394,7 +394,7 @@ def set_shift(control: RS274Control, block: Block, *, from_position: bool) -> No
 
 
 def rotate_system(control: RS274Control, block: Block, code: int) -> None:
-    """G68 X Y R turns the coordinates of the plane about a point, G69 ends it."""
+    """G68 X Y R rotates the coordinates of the plane about a point; G69 ends it."""
     before = control.frames.rotation.rotation
     if code == 680 and (why := uncertain(control, block)):
         control.suspend(ROTATED, why)
@@ -414,7 +414,7 @@ def rotate_system(control: RS274Control, block: Block, code: int) -> None:
 
 
 def uncertain(control: RS274Control, block: Block) -> str:
-    """Why a rotation (G68) is not certain; empty if it is."""
+    """Why a rotation (G68) is uncertain; empty if it is not."""
     if "R" not in block.values:
         return "the angle of the rotation (G68) is not in the program"
     centred = any(LETTERS[index] in block.values for index in control.modal.plane.pair)
@@ -429,7 +429,7 @@ def uncertain(control: RS274Control, block: Block) -> str:
 
 
 def turn_about_point(control: RS274Control, block: Block, before: Rotation) -> None:
-    """Put a rotation by R about the words of the plane into force, on top of another."""
+    """Bring a rotation by R about the point in the words into force, after the rotation `before`."""
     plane = control.modal.plane
     centre = control.program_position()
     for index in plane.pair:
@@ -442,7 +442,7 @@ def turn_about_point(control: RS274Control, block: Block, before: Rotation) -> N
 
 
 def unfollowed(control: RS274Control, block: Block, code: int) -> None:
-    """Scaling, mirroring, polar coordinates and tilted planes: refused for as long as they are in force."""
+    """Scaling, mirroring, polar coordinates and tilted planes: motions are refused while they are in force."""
     if code in UNFOLLOWED:
         if code == 510 and not block.axes and not block.values.keys() & {"I", "J", "K", "P"}:
             return
