@@ -58,7 +58,7 @@ class Row:
     def add(self, source: Path, dialect: str, machine: Machine, tolerance_um: float) -> None:
         """Correct a program."""
         setup = Setup(assume_zero=True, no_point="calculator")
-        options = FixOptions(tolerance_um=tolerance_um, allow_refused=True, force=True, verify=False)
+        options = FixOptions(tolerance_um=tolerance_um, allow_refused=True, force=True, figures=False)
         try:
             report = fix_program(read(source.read_bytes(), source.name, dialect), machine, setup, options).report
         except (NcfixError, SelfCheckError):

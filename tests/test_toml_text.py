@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import tomllib
+
+import numpy as np
 import pytest
 
-from ncfix.toml_text import key_lines, line_of
+from ncfix.toml_text import key_lines, line_of, written
 
 TEXT = '''\
 name = "a"
@@ -74,3 +77,20 @@ def test_a_key_inside_a_line_is_placed_on_its_table() -> None:
 )
 def test_what_only_looks_like_the_begin_of_a_long_text(first: str, line: int) -> None:
     assert key_lines(f"{first}\nb = 2\n")[("b",)] == line
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (np.int64(3), "3"),
+        (np.float64(0.1), "0.1"),
+        (np.bool_(True), "true"),
+        (np.array([[1, 2], [3, 4]]), "[[1, 2], [3, 4]]"),
+        (float("-inf"), "-inf"),
+        (1e16, "1e+16"),
+    ],
+)
+def test_numbers_are_written_as_toml_reads_them(value: object, text: str) -> None:
+    line = written("[a]", {"key": value}).splitlines()[1]
+    assert line == f"key = {text}"
+    assert np.array_equal(tomllib.loads(line)["key"], value)  # type: ignore[arg-type]

@@ -164,6 +164,19 @@ def sums(values: Array, counts: Index) -> Array:
     return total
 
 
+def in_stretches(lines: Ints) -> tuple[tuple[int, int], ...]:
+    """Whole numbers in ascending order, as stretches without gaps, from and to."""
+    begins = np.flatnonzero(np.diff(lines, prepend=-1) > 1)
+    ends = np.append(begins[1:], len(lines)) - 1
+    return tuple(zip(lines[begins].tolist(), lines[ends].tolist(), strict=True))
+
+
+def stops(flags: Mask) -> Ints:
+    """(n + 1,) for each of some things (n,), and behind the last one, the first from there on whose flag is not set."""
+    ends = np.append(np.flatnonzero(~flags), len(flags))
+    return np.repeat(ends, np.diff(ends, prepend=-1))
+
+
 def batches(sizes: Index, most: int) -> list[Index]:
     """Consecutive lists in groups of at most about `most` members, each group with at least one list."""
     if not len(sizes):

@@ -7,7 +7,7 @@ ordinary exception, which the command line reports as a fault of ncfix (exit cod
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from enum import IntEnum
 from typing import ClassVar, Self
 
@@ -126,6 +126,15 @@ def _excerpt(text: str, column: int) -> list[str]:
     head, tail = "..." * (start > 0), "..." * (start + EXCERPT < len(text))
     shown = head + "".join(char if char.isprintable() else " " if char == "\t" else "?" for char in part) + tail
     return [shown, " " * (len(head) + column - 1 - start) + "^"] if column else [shown]
+
+
+def lines_named(stretches: Sequence[tuple[int, int]], most: int = 8) -> str:
+    """Stretches of lines in words, "lines 3 to 5, 9"; of more than `most` only where they begin and end."""
+    first, last = stretches[0][0], stretches[-1][1]
+    if len(stretches) > most:
+        return f"between lines {first} and {last}"
+    parts = [str(a) if a == b else f"{a} to {b}" for a, b in stretches]
+    return f"line{'s' if last > first else ''} {', '.join(parts)}"
 
 
 @mutable(eq=False, slots=False)

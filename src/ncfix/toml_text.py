@@ -395,15 +395,15 @@ def _key(key: str) -> str:
 
 
 def _value(item: Any, indent: int = 0) -> str:
-    """A value in TOML; long lists take several lines."""
+    """A value in TOML, also of numpy types; long lists take several lines."""
+    if hasattr(item, "tolist"):
+        item = item.tolist()
     if isinstance(item, bool):
         return "true" if item else "false"
     if isinstance(item, int):
         return str(item)
     if isinstance(item, float):
-        return (
-            repr(float(item)) if math.isfinite(item) else "nan" if math.isnan(item) else "inf" if item > 0 else "-inf"
-        )
+        return repr(item)
     if isinstance(item, str):
         return json.dumps(item, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(item, datetime.date | datetime.time):

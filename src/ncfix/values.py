@@ -5,11 +5,13 @@ such classes: that took a third of a short run. Here all methods but one are clo
 a class is first called, which in one run most classes never are.
 
 Everything else is left to `dataclasses`: `field`, `fields`, `replace`, `asdict` and `match` work with these classes.
-One difference: a dataclass derived from a frozen one must be `frozen`, too.
+Two differences: a dataclass derived from a frozen one must be `frozen`, too; and objects with an array among their
+fields are equal only if they are the same object, because `==` of arrays is no truth value.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import MISSING, Field, FrozenInstanceError, dataclass, field, fields
 from operator import attrgetter
@@ -17,6 +19,8 @@ from typing import Any, TypeVar, dataclass_transform, overload
 
 T = TypeVar("T")
 PUT = object.__setattr__
+ARRAYS = re.compile(r"\b(?:Array|Mask|Index|Indices|Ints|Signs|Bytes|NDArray|ndarray)\b")
+"""Names of types of arrays."""
 
 
 @overload
@@ -121,8 +125,11 @@ def _init_of(cls: Any, stays: bool) -> Callable[..., None]:
 
 
 def _comparing(cls: Any) -> tuple[Callable[..., object], Callable[..., int]]:
-    """`__eq__` and `__hash__` over the fields that are compared."""
-    names = [each.name for each in fields(cls) if each.compare]
+    """`__eq__` and `__hash__` over the fields that are compared; by identity if one of them is an array."""
+    compared = [each for each in fields(cls) if each.compare]
+    if any(ARRAYS.search(str(each.type)) for each in compared):
+        return object.__eq__, object.__hash__
+    names = [each.name for each in compared]
     values: Callable[[object], object] = lambda self: tuple([getattr(self, name) for name in names])  # noqa: E731
     if len(names) > 1:
         values = attrgetter(*names)  # the same, in a third of the time

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from ncfix.certificate.following import Given
+from ncfix.certificate.coordinates import Given
 from ncfix.certificate.proof import BlockProof, prove
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
@@ -55,6 +55,7 @@ class Writer:
     numbered  every block has its number
     frame     "turned" or "tilted": now and then the coordinates are turned in their plane, or a plane is tilted
     formulas  some words are formulas of a variable
+    loops     some of its motions are made several times
     """
 
     language: str
@@ -65,6 +66,7 @@ class Writer:
     lines: list[str]
     frame: str = ""
     formulas: bool = False
+    loops: bool = False
 
     @property
     def klartext(self) -> bool:
@@ -178,9 +180,15 @@ class Writer:
         every = "XYZAC" if self.five else "XYZ"
         self.motion(True, every)
         self.motion(False, every, "F500")
+        ends: list[str] = []
         for k in range(blocks):
             if self.frame and k % 9 == 3:
                 self.turn()
+            if self.loops and k % 6 == 2 and self.language != "iso":
+                lines, ends = (ends, []) if ends else self._loop(k // 12)
+                for line in lines:
+                    self.put(line)
+                self.motion(False, rng.choice((every, every, "XY")))
             choice = rng.random()
             if choice < 0.12 and not self.five:
                 self.arc()
@@ -195,8 +203,25 @@ class Writer:
             else:
                 axes = [axis for axis in every if rng.random() < 0.7] or ["X"]
                 self.motion(False, "".join(axes), rng.choice(("", "", "F800", "F1200")))
+        for line in ends:
+            self.put(line)
         self.put({"heidenhain": "END PGM PART MM"}.get(self.language, "M30"))
         return ("\n".join(self.lines) + "\n").encode()
+
+    def _loop(self, number: int) -> tuple[list[str], list[str]]:
+        """The lines before and behind what is made several times."""
+        times, name = self.rng.randint(1, 3), f"{1 + number}"
+        match self.language:
+            case "heidenhain":
+                return [f"LBL {name}"], [f"CALL LBL {name} REP {times}"]
+            case "siemens" if self.rng.random() < 0.5:
+                return [f"AGAIN_{name}:"], [f"REPEAT AGAIN_{name} P={times}"]
+            case "siemens":
+                return ["R9=0", f"AGAIN_{name}:"], ["R9=R9+1", f"IF R9<{times} GOTOB AGAIN_{name}"]
+            case "fanuc":
+                return ["#109=0", f"WHILE [#109 LT {times}] DO1"], ["#109=#109+1", "END1"]
+            case _:
+                return [f"O10{name} REPEAT [{times}]"], [f"O10{name} ENDREPEAT"]
 
     def turn(self) -> None:
         """Coordinates are turned, or a plane is tilted, and the tool goes there; or they are not turned any more."""
@@ -290,11 +315,12 @@ def cases(count: int, seed: int) -> Iterator[Case]:
         turns = {"linuxcnc": ("",), "iso": ("", "turned")}.get(language, ("", "turned", "tilted"))
         frame = "" if five or rng.random() < 0.6 else rng.choice(turns)
         formulas = language != "iso" and rng.random() < 0.3
-        writer = Writer(language, rng, numbered, five, {}, [], frame, formulas)
+        loops = not frame and rng.random() < 0.3
+        writer = Writer(language, rng, numbered, five, {}, [], frame, formulas, loops)
         original = writer.program(rng.randint(8, 40))
         known = machines[five or frame == "tilted"]
         program = read(original, "part", get(language))
-        fixed = fix_program(program, known, SETUP, FixOptions(verify=False, allow_refused=True))
+        fixed = fix_program(program, known, SETUP, FixOptions(figures=False, allow_refused=True))
         made += 1
         yield Case(language, original, fixed.text, known, numbered)
 

@@ -7,8 +7,8 @@ import random
 import pytest
 
 from certificate.planting import GIVEN, LANGUAGES, SETUP, Writer, machine
+from ncfix.certificate.coordinates import Given
 from ncfix.certificate.findings import BlockProof
-from ncfix.certificate.following import Given
 from ncfix.certificate.proof import prove
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
@@ -29,7 +29,7 @@ def marked(language: str, rng: random.Random) -> bytes:
 
 
 def corrected(text: bytes, language: str) -> bytes:
-    options = FixOptions(verify=False, allow_refused=True)
+    options = FixOptions(figures=False, allow_refused=True)
     return fix_program(read(text, "part", get(language)), machine("three"), SETUP, options).text
 
 

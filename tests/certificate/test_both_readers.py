@@ -88,7 +88,7 @@ def test_both_readers_follow_alike(case: Shop) -> None:
     tools = {number: Tool(length, 3.0) for number, length in ((0, 80.0), (1, 60.0), (2, 95.0))}
     setup, known, dialect = Setup(tools=tools, assume_zero=True, tcp=case.tcp), machine(case.machine), get(case.dialect)
     text = case.text.encode()
-    options = FixOptions(verify=False, allow_refused=True, tolerance_um=5.0)
+    options = FixOptions(figures=False, allow_refused=True, tolerance_um=5.0)
     fixed = fix_program(read(text, "part", dialect), known, setup, options).text
     proof = prove(text, fixed, known, given_of(setup, dialect), case.dialect)
     assert not proof.faults
@@ -138,26 +138,26 @@ KLARTEXT = "BEGIN PGM A MM\nTOOL CALL 1 Z S800\nL X+0 Y+0 Z+100 FMAX\n{}END PGM 
 DIGITS = {
     "a word of finer digits that is left, for the control rounds it": (
         "three",
-        FixOptions(verify=False),
+        FixOptions(figures=False),
         "heidenhain",
         "L X-5.9013 Y+6.2 Z+38.32 FMAX\nL X-17.933 Y+17.6069 F500\nCC X-21.308 Y+16.6778\nC X-22.5326 Y+19.9572 DR-\n",
     ),
     "an axis that finer digits have brought to its place": (
         "three",
-        FixOptions(verify=False, tolerance_um=2.0),
+        FixOptions(figures=False, tolerance_um=2.0),
         "heidenhain",
         "L X-16.3434 Y+8.8125 FMAX\nL Z+40.0000 FMAX\nL Z+39.3173 F1000\n"
         "CC X-19.6132 Y+20.7746\nC X-31.8124 Y+18.5467 DR-\n",
     ),
     "finer digits in turned coordinates": (
         "three",
-        FixOptions(verify=False, strategy="position", tolerance_um=5.0),
+        FixOptions(figures=False, strategy="position", tolerance_um=5.0),
         "heidenhain",
         "CYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+90\nL X+2.011 Y-0.2777 FMAX\nL Z+36.91 F640\nL X+21.6242 F640\n",
     ),
     "a piece near the end of its block where rotary axes are corrected, too": (
         "table",
-        FixOptions(verify=False, strategy="full"),
+        FixOptions(figures=False, strategy="full"),
         "iso",
         "G21 G17 G40 G90 G94\nT1 M6\nG54\nG43 H1\nG0 X2.85 Y-2.8 Z30.57 A12. C41.\nG1 Z26.63 F1000.\n"
         "G3 X-6.82 Y4.02 Z26.48 I-5.13 J2.99\nG1 X-6.42 Y6.51\nG3 X-4.51 Y-18.64 I2.73 J-12.44\nG0 Z90.\nM2\n",

@@ -60,7 +60,7 @@ def numbered(text: str, dialect: str) -> str:
 
 
 def corrected(text: str, dialect: str) -> str:
-    options = FixOptions(verify=False)
+    options = FixOptions(figures=False)
     return fix_program(read(text.encode(), "part", get(dialect)), machine("three"), SETUP, options).text.decode()
 
 

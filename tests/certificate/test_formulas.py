@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from certificate.planting import SETUP, machine
+from ncfix.certificate.coordinates import Given
 from ncfix.certificate.findings import BlockProof
-from ncfix.certificate.following import Given
 from ncfix.certificate.formulas import LONGEST, value_of
 from ncfix.certificate.proof import prove
 from ncfix.compensate import FixOptions

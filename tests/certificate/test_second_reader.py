@@ -11,8 +11,8 @@ import pytest
 
 from certificate.planting import GIVEN, cases
 from ncfix.certificate.certificate import Subject
+from ncfix.certificate.coordinates import Given
 from ncfix.certificate.expected import Expected
-from ncfix.certificate.following import Given
 from ncfix.certificate.proof import prove
 from ncfix.certificate.reading import READERS, Family
 from ncfix.certificate.text import Lines, Text

@@ -8,8 +8,8 @@ import pytest
 
 from certificate.planting import machine
 from conftest import FULL
+from ncfix.certificate.coordinates import Given
 from ncfix.certificate.findings import BlockProof
-from ncfix.certificate.following import Given
 from ncfix.certificate.proof import prove
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
@@ -52,7 +52,7 @@ def shifted(rng: random.Random, dialect: str) -> bytes:
 def proof_of(text: bytes, dialect: str, change: tuple[bytes, bytes] = (b"", b"")) -> tuple[BlockProof, bytes]:
     """The proof of a correction in which something was changed, and the correction."""
     setup = Setup(work_offsets=PLACES, initial=START, assume_zero=True)
-    options = FixOptions(allow_refused=True, verify=False)
+    options = FixOptions(allow_refused=True, figures=False)
     three = machine("three")
     fixed = fix_program(read(text, "part", get(dialect)), three, setup, options).text
     return prove(text, fixed.replace(*change, 1), three, Given(PLACES, initial=START, assume_zero=True), dialect), fixed

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from certificate.planting import machine
+from ncfix.certificate.coordinates import Given
 from ncfix.certificate.findings import BlockProof
-from ncfix.certificate.following import Given
 from ncfix.certificate.proof import prove
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_flat, fix_program
@@ -18,7 +18,7 @@ from ncfix.text.reader import read
 def proof_of(text: bytes, name: str, initial: dict[str, float], dialect: str = "linuxcnc") -> BlockProof:
     """The proof of the correction of a program on a machine of the goldens."""
     setup, given = Setup(initial=initial, assume_zero=True), Given(initial=initial, assume_zero=True)
-    options = FixOptions(verify=False, allow_refused=True)
+    options = FixOptions(figures=False, allow_refused=True)
     known = machine(name)
     fixed = fix_program(read(text, "part", get(dialect)), known, setup, options).text
     return prove(text, fixed, known, given, dialect)
@@ -66,7 +66,7 @@ def test_a_repeated_cycle_that_is_written_out_is_no_fault() -> None:
         b"G21 G90 G17 G80\nG0 X0. Y0. Z20.\nG99 G81 X5. Y5. Z-5. R2. F100.\nG91 X20. L3\nG90 G80\nG0 X3. Y1. Z20.\nM2\n"
     )
     known, setup = machine("three"), Setup(assume_zero=True)
-    flat = fix_flat(read(text, "part", get("linuxcnc")), known, setup, FixOptions(verify=False, flatten=True)).text
+    flat = fix_flat(read(text, "part", get("linuxcnc")), known, setup, FixOptions(figures=False, flatten=True)).text
     assert flat.count(b"\n") > text.count(b"\n") + 2
     proof = prove(text, flat, known, Given(assume_zero=True), "linuxcnc")
     assert (proof.faults, proof.proved_motions) == ([], 3)
@@ -112,7 +112,7 @@ def klartext_proof(text: str, change: tuple[str, str] = ("", "")) -> BlockProof:
     initial = dict.fromkeys("XYZAC", 0.0)
     offsets, length = {"PRESET1": {"X": 5.0, "Y": 0.0, "Z": 40.0}}, 90.0
     setup = Setup(work_offsets=offsets, named_tools={"FR10": Tool(length)}, initial=initial)
-    known, options = machine("table"), FixOptions(verify=False)
+    known, options = machine("table"), FixOptions(figures=False)
     fixed = fix_program(read(text.encode(), "part", get("heidenhain")), known, setup, options).text.decode()
     assert change[0] in fixed
     given = Given(offsets=offsets, tools={"FR10": length}, initial=initial)
@@ -184,7 +184,7 @@ def test_what_posts_of_sinumerik_write_is_followed_and_half_turns_need_not_be_sp
     known, start = machine("table"), dict.fromkeys("XYZAC", 0.0)
     setup = Setup(work_offsets={"G54": {}}, tools={1: Tool(80.0)}, initial=start, assume_zero=True)
     text = SIEMENS.format(c=c).encode()
-    options = FixOptions(verify=False, allow_refused=True)
+    options = FixOptions(figures=False, allow_refused=True)
     fixed = fix_program(read(text, "part", get("siemens")), known, setup, options).text
     given = Given(offsets={"G54": {}}, tools={1: 80.0}, initial=start, assume_zero=True)
     proof = prove(text, fixed, known, given, "siemens")
@@ -201,7 +201,7 @@ def test_between_a_tool_change_and_the_next_length_offset_nothing_is_called_faul
     initial = dict.fromkeys("XYZAC", 0.0)
     setup = Setup(work_offsets={"G54": {}}, tools={1: Tool(120.0), 2: Tool(60.0)}, initial=initial)
     given = Given(offsets={"G54": {}}, tools={1: 120.0, 2: 60.0}, initial=initial)
-    fixed = fix_program(read(text, "part", get("fanuc")), machine("table"), setup, FixOptions(verify=False)).text
+    fixed = fix_program(read(text, "part", get("fanuc")), machine("table"), setup, FixOptions(figures=False)).text
     proof = prove(text, fixed, machine("table"), given, "fanuc")
     assert (proof.faults, proof.lines("the length of the tool is not known")) == ([], [8])
 
@@ -210,7 +210,7 @@ def test_a_sinumerik_begins_with_the_first_edge_of_the_tool_in_the_spindle() -> 
     text = b"G71 G90 G17 G94\nG0 X-20 Y20\nG0 Z26\nG1 Z20 F100\nM30\n"
     initial, known = {"X": 0.0, "Y": 0.0, "Z": 250.0}, machine("three")
     setup = Setup(initial=initial, work_offsets={"G500": {}}, tools={0: Tool(length=80.0)})
-    fixed = fix_program(read(text, "part", get("siemens")), known, setup, FixOptions(verify=False)).text
+    fixed = fix_program(read(text, "part", get("siemens")), known, setup, FixOptions(figures=False)).text
     proof = prove(text, fixed, known, Given(initial=initial, tools={0: 80.0}), "siemens")
     assert (proof.faults, proof.proved_motions) == ([], 3)
 
@@ -239,7 +239,7 @@ def test_a_surface_normal_is_not_followed_and_all_behind_it_is() -> None:
 def test_an_end_of_the_program_that_is_lost_is_a_fault() -> None:
     text = b"%\nO1(A)\nG21 G90 G17\nG0 X1. Y2. Z9.\nG1 X5. F300.\nM30\n%\n"
     known, setup, given = machine("three"), Setup(assume_zero=True), Given(assume_zero=True)
-    fixed = fix_program(read(text, "part", get("fanuc")), known, setup, FixOptions(verify=False)).text
+    fixed = fix_program(read(text, "part", get("fanuc")), known, setup, FixOptions(figures=False)).text
     assert prove(text, fixed, known, given, "fanuc").faults == []
     for lost in (b"M30\n", b"M30\n%\n", b"\n%\n"):
         assert prove(text, fixed.replace(lost, b"\n" if lost[:1] == b"\n" else b""), known, given, "fanuc").faults

@@ -43,7 +43,7 @@ def test_turns_are_followed_and_faults_in_them_found(language: str, frame: str, 
     motions = proved = 0
     for _ in range(some(10)):
         text = Writer(language, rng, True, False, {}, [], frame).program(30)
-        program, options = read(text, "part", get(language)), FixOptions(verify=False, allow_refused=True)
+        program, options = read(text, "part", get(language)), FixOptions(figures=False, allow_refused=True)
         case = Case(language, text, fix_program(program, known, SETUP, options).text, known, True)
         proof = judged(case, case.corrected)
         assert not proof.faults

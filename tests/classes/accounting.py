@@ -120,7 +120,7 @@ def account(
             books.files["of another family" if error.messages[0].code in FOREIGN else "unreadable"] += 1
             continue
         try:
-            report = fix(program, machine, setup, FixOptions(verify=False, tolerance_um=5.0), resolve).report
+            report = fix(program, machine, setup, FixOptions(figures=False, tolerance_um=5.0), resolve).report
         except NcfixError as error:
             books.files["not followed"] += 1
             books.stopped[f"{error.messages[0].code} {error.messages[0].text}"] += 1

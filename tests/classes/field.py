@@ -57,7 +57,7 @@ def faults(path: Path, dialect: str, machine: Machine) -> list[str]:
     assert program.source == source
     flat = f"@ {FLAT}" in text
     moves = follow(program, machine, SETUP).trace.moves
-    options = FixOptions(verify=False)
+    options = FixOptions(figures=False)
     report = (fix_flat if flat else fix_program)(program, machine, SETUP, options).report
     refused = {each.line: each.reason for each in report.refused}
     if flat:

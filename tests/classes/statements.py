@@ -123,7 +123,7 @@ def outcome(case: Case) -> Outcome:
     try:
         program = read(source, "part", case.family.dialect)
         moves = trace(program, SETUP, MACHINE.axis_names, frozenset(), kinematics=kinematics_of(MACHINE)).moves
-        fixed = fix_program(program, MACHINE, SETUP, FixOptions(tolerance_um=50.0, verify=False))
+        fixed = fix_program(program, MACHINE, SETUP, FixOptions(tolerance_um=50.0, figures=False))
     except NcfixError as error:
         places = [message.place for message in error.messages]
         return Outcome("stopped" if any(p is None or p.line >= case.line for p in places) else f"elsewhere: {error}")

@@ -157,7 +157,7 @@ def test_a_full_circle_needs_no_end_point(circle: str) -> None:
     text = f"{HEAD}CC X+11 Y+2\n{circle}\nL X+5\nC X+17 DR+\nM30\nEND PGM C MM\n".encode()
     setup = Setup(work_offsets={"PRESET": {}}, tools={0: Tool(0.0)}, initial={"X": 0.0, "Y": 0.0, "Z": 200.0})
     known = shifted_machine()
-    fixed = fix_program(read(text, "c.h"), known, setup, FixOptions(tolerance_um=50.0, verify=False))
+    fixed = fix_program(read(text, "c.h"), known, setup, FixOptions(tolerance_um=50.0, figures=False))
     before, after = followed(text, known, "heidenhain"), followed(fixed.text, known, "heidenhain")
     assert fixed.report.refused == ()
     assert (
@@ -192,7 +192,7 @@ def test_holes_are_right_down_to_their_bottom(name: str, holes: str) -> None:
     known = shifted_machine()
     text = (HEAD + CYCLES[name] + "\n" + holes + "\nM30\nEND PGM C MM\n").encode()
     setup = Setup(work_offsets={"PRESET": {}}, tools={0: Tool(0.0)}, initial={"X": 0.0, "Y": 0.0, "Z": 200.0})
-    fixed = fix_program(read(text, "c.h"), known, setup, FixOptions(tolerance_um=50.0, verify=False))
+    fixed = fix_program(read(text, "c.h"), known, setup, FixOptions(tolerance_um=50.0, figures=False))
     before, after = followed(text, known, "heidenhain"), followed(fixed.text, known, "heidenhain")
     off = after.end - before.end
     assert fixed.report.refused == ()

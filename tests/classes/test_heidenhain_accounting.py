@@ -51,7 +51,7 @@ def machine_for(source: bytes, root: Path) -> Machine:
 def account(folder: Path, root: Path) -> tuple[Account, Account]:
     """Correct every program and keep the books: as it is, and with --flatten where something is refused."""
     plain, flat = Account(), Account()
-    options = FixOptions(verify=False, tolerance_um=50.0)
+    options = FixOptions(figures=False, tolerance_um=50.0)
     for path in sorted(folder.iterdir()):
         if path.name in (NO_KLARTEXT, TWIN) or (path.name == LARGE and not os.environ.get("NCFIX_CORPUS")):
             continue

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ncfix.cli.console import MOST, keeping, lines_named, said_once, tell_some
-from ncfix.diagnostics import Message, Place
+from ncfix.cli.console import MOST, keeping, said_once, tell_some
+from ncfix.diagnostics import Message, Place, lines_named
 
 
 def said(*lines: int, text: str = "why", path: str = "p.nc") -> list[Message]:
@@ -49,9 +49,9 @@ def test_other_axes_rates_and_several_figures_stay_apart() -> None:
 
 
 def test_many_stretches_are_only_bounded() -> None:
-    assert lines_named([2, 4]) == "lines 2, 4"
-    assert lines_named([7]) == "line 7"
-    assert lines_named(range(2, 40, 2)) == "between lines 2 and 38"
+    assert lines_named([(2, 2), (4, 6)]) == "lines 2, 4 to 6"
+    assert lines_named([(7, 7)]) == "line 7"
+    assert lines_named([(line, line) for line in range(2, 40, 2)]) == "between lines 2 and 38"
 
 
 def test_of_many_that_say_something_else_the_first_are_said_and_the_rest_is_counted() -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from compensate.machines_at_random import perfect
 from compensate.motions import motions
+from ncfix.arrays import in_stretches
 from ncfix.compensate.account import (
     BY_RULE,
     HINT,
@@ -22,7 +23,6 @@ from ncfix.compensate.account import (
     NoFigureReason,
     Reason,
     either,
-    in_stretches,
     joined,
     merged,
     not_looked_at,

@@ -24,7 +24,7 @@ SETUP = Setup(
     initial=ZERO | {"Z": 200.0},
     no_point="calculator",
 )
-OPTIONS = FixOptions(verify=False)
+OPTIONS = FixOptions(figures=False)
 HEAD = "G21 G90 G17 G40 G49 G80 G94 G54\nG0 X0. Y0. Z50.\n"
 HOLES = "X10. Y5. Z-4. R2. F100.\nX140.\nY145.\nX80. Y60. Z-12. R5.\nX-150.\nG80\n"
 HALF = 0.0005 + 1e-9

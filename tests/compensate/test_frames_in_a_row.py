@@ -25,7 +25,7 @@ def test_the_last_motion_goes_where_it_should_in_the_machine(count: int, root: P
     machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
     frames = "".join(f"G0 X0. Y0. Z30.\nG92 X{n + 1}. Y{-n}. Z2{n}.\n" for n in range(count))
     program = read((HEAD + frames + TAIL).encode(), "part.nc", "fanuc")
-    fixed = fix_program(program, machine, SETUP, FixOptions(verify=False))
+    fixed = fix_program(program, machine, SETUP, FixOptions(figures=False))
     assert not fixed.report.refused
     before, after = (follow(each, machine, SETUP).trace.moves for each in (program, read(fixed.text, "part", "fanuc")))
     off = np.abs(after.end - before.end)[-1]

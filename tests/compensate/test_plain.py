@@ -89,7 +89,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
         (1, 0.0, OPTIONS),
         (2, 0.006, OPTIONS),
         (3, 0.0, FixOptions(tolerance_um=1.5, allow_refused=True, split_rapids=True)),
-        (4, 0.0, FixOptions(tolerance_um=20.0, allow_refused=True, verify=False)),
+        (4, 0.0, FixOptions(tolerance_um=20.0, allow_refused=True, figures=False)),
     ],
 )
 def test_as_by_the_long_way(

@@ -35,7 +35,7 @@ def with_steps(machine: Machine, step: float) -> Machine:
 
 
 def inserted(text: str, machine: Machine, tolerance_um: float = 1.0) -> int:
-    options = FixOptions(tolerance_um=tolerance_um, verify=False)
+    options = FixOptions(tolerance_um=tolerance_um, figures=False)
     return fix_program(read(text.encode(), "part.ngc", "linuxcnc"), machine, SETUP, options).report.inserted_blocks
 
 

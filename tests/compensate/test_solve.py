@@ -31,7 +31,7 @@ def loop_to(end: float, step: float, machine: Machine) -> tuple[dict[int, str], 
     start = end - 3 * step
     text = f"G21 G90 G94 F500 G54\nG0 X0 Y90 Z-40\nG1 X{start}\no1 repeat [3]\nG91 G1 X{step}\no1 endrepeat\nM2\n"
     program = read(text.encode(), "part.ngc", "linuxcnc")
-    fixed = fix_program(program, machine, SETUP, FixOptions(tolerance_um=50.0, verify=False))
+    fixed = fix_program(program, machine, SETUP, FixOptions(tolerance_um=50.0, figures=False))
     moves = follow(read(fixed.text, "part.ngc", "linuxcnc"), machine, SETUP).trace.moves
     return {each.line: each.reason for each in fixed.report.refused}, moves.end[moves.kind != MotionKind.DWELL]
 
@@ -74,6 +74,6 @@ def test_attempts_that_refuse_and_correct_by_turns_come_to_an_end(dialect: str, 
     """The level and the depth that the second call finds are those that the first one left, corrected or not."""
     program = read(CALLED[dialect].encode(), "part.nc", dialect)
     setup = replace(SETUP, no_point="calculator", tools={1: Tool(100.0)})
-    fixed = fix_program(program, machine, setup, FixOptions(verify=False))
+    fixed = fix_program(program, machine, setup, FixOptions(figures=False))
     assert fixed.changed
     assert [each.line for each in fixed.report.refused][-1] > 8

@@ -296,7 +296,7 @@ def test_what_cannot_be_proven_in_all_positions_is_refused(family: str, seed: in
     study = {"siemens": siemens_family, "heidenhain": klartext_family}[family](root)
     program = read(study.source(seed).encode(), "part", study.dialect)
     with pytest.raises(NcfixError) as raised:
-        fix_program(program, load(str(study.machine)), study.setup, FixOptions(verify=False))
+        fix_program(program, load(str(study.machine)), study.setup, FixOptions(figures=False))
     assert raised.value.code == "NCF453"
 
 

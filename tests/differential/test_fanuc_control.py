@@ -53,7 +53,7 @@ def judged(text: str, root: Path, strategy: str, flat: bool = False) -> tuple[di
     """The worst distance of ends, holes and ways from where they should be, mm, and how many motions were judged."""
     text = fanuc.marked(text)
     program = read(text.encode(), "part.nc", "fanuc")
-    options = FixOptions(strategy=strategy, verify=False, flatten=flat)
+    options = FixOptions(strategy=strategy, figures=False, flatten=flat)
     fixed = (fix_flat if flat else fix_program)(program, load(str(root / MACHINE)), SETUP, options)
     left = {refusal.line for refusal in fixed.report.refused}
     left |= {note.place.line for note in fixed.report.warnings if note.place and "must not be split" in note.text}

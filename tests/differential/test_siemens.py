@@ -50,7 +50,7 @@ def judged(text: str, root: Path, strategy: str, flat: bool = False) -> tuple[fl
     """
     text = sinumerik.marked(text)
     program = read(text.encode(), "part.mpf", "siemens")
-    options = FixOptions(strategy=strategy, verify=False, flatten=flat)
+    options = FixOptions(strategy=strategy, figures=False, flatten=flat)
     fixed = (fix_flat if flat else fix_program)(program, load(str(root / MACHINE)), SETUP, options)
     left = {refusal.line for refusal in fixed.report.refused}
     left |= {note.place.line for note in fixed.report.warnings if note.place and "must not be split" in note.text}
@@ -132,7 +132,7 @@ def test_patterns_of_holes_are_written_out(root: Path, figures: Callable[[str], 
     for seed in range(PROGRAMS // 2):
         text = sinumerik.marked(patterned(seed))
         program = read(text.encode(), "part.mpf", "siemens")
-        fixed = fix_flat(program, load(str(root / MACHINE)), SETUP, FixOptions(verify=False, flatten=True))
+        fixed = fix_flat(program, load(str(root / MACHINE)), SETUP, FixOptions(figures=False, flatten=True))
         assert not fixed.report.refused
         meant, done = (by_mark(model, each, actual=n == 1) for n, each in enumerate((text, fixed.text.decode())))
         for mark, (ways, tips) in meant.items():

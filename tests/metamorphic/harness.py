@@ -35,7 +35,7 @@ SETUP = Setup(
     initial={"X": 0.0, "Y": 0.0, "Z": 290.0, "A": 0.0, "B": 0.0, "C": 0.0},
     no_point="IS-B",
 )
-OPTIONS = FixOptions(tolerance_um=50.0, verify=False)
+OPTIONS = FixOptions(tolerance_um=50.0, figures=False)
 """So wide that nothing is split, and the motions of both programs are the same ones."""
 
 

@@ -50,7 +50,7 @@ def test_a_program(folder: Path, root: Path, monkeypatch: pytest.MonkeyPatch) ->
 
     program = read(PROGRAM, "part.nak", dialect=NAKANO)
     machine = load(root / "examples/machines/dmu50.toml")
-    fixed = fix_program(program, machine, Setup(assume_zero=True), FixOptions(verify=False))
+    fixed = fix_program(program, machine, Setup(assume_zero=True), FixOptions(figures=False))
     text = fixed.text.decode()
     assert not fixed.report.refused
     assert 'MSG["G0 X99. IS NO MOTION"]' in text

@@ -42,7 +42,7 @@ def machine(root: Path) -> Machine:
 def both(text: str, dialect: str, machine: Machine) -> tuple[Moves, Moves]:
     """The motions of a program and of what it is corrected to, which has as many."""
     program = read(text.encode(), "part", dialect)
-    fixed = fix_program(program, machine, SETUP, FixOptions(verify=False))
+    fixed = fix_program(program, machine, SETUP, FixOptions(figures=False))
     assert not fixed.report.refused
     before, after = (follow(each, machine, SETUP).trace.moves for each in (program, read(fixed.text, "part", dialect)))
     assert len(before) == len(after)

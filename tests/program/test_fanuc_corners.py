@@ -27,7 +27,7 @@ def machine(root: Path) -> Machine:
 def corrected(body: str, machine: Machine) -> list[str]:
     program = read(f"{HEAD}{body}G0 Z50.\nM30\n".encode(), "part", "fanuc")
     setup = Setup(assume_zero=True, no_point="calculator")
-    found = fix_program(program, machine, setup, FixOptions(verify=False))
+    found = fix_program(program, machine, setup, FixOptions(figures=False))
     assert not found.report.refused
     return found.text.decode().splitlines()[4:]
 

@@ -23,7 +23,7 @@ def padded(block: str, length: int) -> str:
 def test_no_line_grows_beyond_what_the_control_takes(block: str, length: int) -> None:
     text = f"G21 G90 G17 G54 G94\nG0 X1 Y2 Z3\n{padded(block, length)}\nG1 X7 Y7 Z3 F100\nM2\n"
     fixed = fix_program(
-        read(text.encode(), "c.ngc"), shifted_machine(), SETUP, FixOptions(tolerance_um=50.0, verify=False)
+        read(text.encode(), "c.ngc"), shifted_machine(), SETUP, FixOptions(tolerance_um=50.0, figures=False)
     )
     assert max(map(len, fixed.text.splitlines())) <= LIMIT
     refused = {each.line for each in fixed.report.refused}

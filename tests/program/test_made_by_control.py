@@ -27,7 +27,7 @@ CALCULATED = 0.00071
 def fixed(dialect: str, body: str, machine: Machine | None = None, flat: bool = False, setup: Setup = SETUP) -> Fixed:
     """A body behind a tool call at X0 Y0 Z100, corrected."""
     program = read(f"{HEAD}{body}\nG0 Z100.\nM30\n".encode(), "part.nc", dialect)
-    options = FixOptions(tolerance_um=60, verify=False)
+    options = FixOptions(tolerance_um=60, figures=False)
     return (fix_flat if flat else fix_program)(program, machine or shifted_machine(), setup, options)
 
 

@@ -78,7 +78,7 @@ def test_both_lanes_agree(dialect: str, machine: Machine) -> None:
 
 def test_no_piece_leads_the_axis_round(machine: Machine) -> None:
     text = HEAD + "X40. Y30. C350.\nX-40. Y-30. C5.\nX40. C100.\nM30\n"
-    fixed = fix_program(read(text.encode(), "part.nc", "fanuc"), machine, SETUP, FixOptions(verify=False))
+    fixed = fix_program(read(text.encode(), "part.nc", "fanuc"), machine, SETUP, FixOptions(figures=False))
     angles = [float(word[1:]) for word in fixed.text.decode().split() if word[0] == "C" and word[1:2].isdigit()]
     assert angles[:3] == pytest.approx([0.0, 350.0, 5.0])
     assert np.all(np.abs(np.diff(angles[2:])) < 100.0)
@@ -86,7 +86,7 @@ def test_no_piece_leads_the_axis_round(machine: Machine) -> None:
 
 def test_a_corrected_angle_leads_no_axis_round(machine: Machine) -> None:
     text = HEAD + "X10. A20. C30.\nX20. C40.\nX30. C219.995\nX40. C200.\nM30\n"
-    options = FixOptions(strategy="full", verify=False)
+    options = FixOptions(strategy="full", figures=False)
     fixed = fix_program(read(text.encode(), "part.nc", "fanuc"), machine, SETUP, options).text.decode()
     assert "C219.995" in fixed
     assert "C40." in fixed
@@ -98,7 +98,7 @@ def at_zero(machine: Machine, dialect: str) -> list[str]:
     rng = np.random.default_rng(1)
     places = rng.uniform((-60, -60, -80), (60, 60, 80), (60, 3))
     text = HEAD + "".join(f"X{x:.0f}. Y{y:.0f}. A{a:.0f}. C0.\nA{a:.0f}. C340.\n" for x, y, a in places) + "M30\n"
-    options = FixOptions(strategy="full", verify=False)
+    options = FixOptions(strategy="full", figures=False)
     fixed = fix_program(read(text.encode(), "part.nc", dialect), machine, SETUP, options).text.decode()
     return [word[1:] for word in fixed.split() if word[0] == "C" and word[1:2] in "-0123456789"]
 

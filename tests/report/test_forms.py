@@ -93,6 +93,13 @@ def test_a_map_of_arrows_has_a_panel_for_each_title_and_one_scale() -> None:
     assert "before up to 5.0 um; after up to 0.5 um" in markdown(Document("a", [ReportSection("b", [part])])).decode()
 
 
+def test_a_map_of_arrows_may_have_any_number_of_panels() -> None:
+    shifts = {f"{number}": np.tile([1.0, 0.0], (5, 1)) for number in range(9)}
+    part = ArrowMap("Residuals.", "X, mm", "Y, mm", X, -X, shifts, "um")
+    text = html(Document("a", [ReportSection("b", [part])])).decode()
+    assert text.count("<line ") == 45
+
+
 def test_the_suffix_says_the_form() -> None:
     assert form_of("a/b.html")(DOCUMENT) == html(DOCUMENT)
     assert form_of("page")(DOCUMENT) == html(DOCUMENT)

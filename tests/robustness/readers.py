@@ -190,7 +190,7 @@ def _program(language: str, text: bytes) -> None:
 def _corrected(language: str, text: bytes, name: str = "three") -> None:
     """Correct it, and let the second reader judge: where both follow it they must agree."""
     program, known = read(text, "part", get(language)), _machine(name)
-    fixed = fix_program(program, known, _setup(), FixOptions(verify=False, allow_refused=True, force=True))
+    fixed = fix_program(program, known, _setup(), FixOptions(figures=False, allow_refused=True, force=True))
     if b"ncfix" in text.lower():
         return
     proof = prove(text, fixed.text, known, GIVEN, language)

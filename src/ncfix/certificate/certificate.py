@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Any
 
+from ncfix.certificate.coordinates import Given
 from ncfix.certificate.findings import BlockProof
-from ncfix.certificate.following import Given
 from ncfix.certificate.proof import prove
 from ncfix.diagnostics import Place, SourceError
 from ncfix.machine import Machine

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from ncfix.arrays import Array, Index, Mask
+from ncfix.certificate.coordinates import Given
 from ncfix.certificate.families import follower_of
-from ncfix.certificate.following import Given
+from ncfix.certificate.flow import NotPlainError
+from ncfix.certificate.following import AxisFollower
 from ncfix.certificate.model import TipModel, Ways
 from ncfix.certificate.reading import AXES, TextLine
 from ncfix.certificate.steps import AxisStep, Kind, ProgramSteps
@@ -47,7 +49,16 @@ class Expected:
     told        (n,) whether it is known where the corrected line should lead
     """
 
-    def __init__(self, first: Text, second: Text, machine: Machine, given: Given, tolerance_um: float = 1.0) -> None:
+    def __init__(
+        self,
+        first: Text,
+        second: Text,
+        machine: Machine,
+        given: Given,
+        tolerance_um: float = 1.0,
+        turn: int | None = None,
+    ) -> None:
+        """Follow both programs; `turn` is that of `AxisFollower.run`, of programs that have the same loops."""
         self.first, self.second, self.given = first, second, given
         x, y, z = (a + b for a, b in zip(machine.workpiece_offset, given.workpiece_offset, strict=True))
         placed = ((x, y, z), dict(given.inputs))
@@ -56,9 +67,12 @@ class Expected:
         self.machine = machine
         self.model = TipModel.of(self.machine)
         self.strategy = second.stamp.strategy if second.stamp else "rotary-then-linear"
-        ours, theirs = (follower_of(text.family, machine.axis_names, given, self.model) for text in (first, second))
-        self.ours, self.theirs = ours.run(first), theirs.run(second)
-        self.foreign = ours.foreign
+        turn = None if self.machine.depends_on_direction else turn
+        try:
+            (ours, self.ours), (theirs, self.theirs) = (self._followed(text, turn) for text in (first, second))
+        except NotPlainError:
+            (ours, self.ours), (theirs, self.theirs) = (self._followed(text, None) for text in (first, second))
+        self.foreign, self.turns = ours.foreign, ours.turns
         self.calls, self.calls_there = ours.calls, theirs.calls
         self.tolerance = (second.stamp.tolerance_um if second.stamp else tolerance_um) / 1e3
         self._halves: dict[tuple[Any, ...], Array] = {}
@@ -73,6 +87,10 @@ class Expected:
         self.told = self.sure & ~self.ours.unsaid
         if self.machine.depends_on_direction:
             self.told &= self.one_sided & (np.abs(self.ours.sweep) <= WHOLE_TURN)
+
+    def _followed(self, text: Text, turn: int | None) -> tuple[AxisFollower, ProgramSteps]:
+        follower = follower_of(text.family, self.machine.axis_names, self.given, self.model)
+        return follower, follower.run(text, turn)
 
     def _expect(self, model: TipModel) -> None:
         """Compute `expected`."""

@@ -6,13 +6,13 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
+from ncfix.certificate.coordinates import Given
 from ncfix.certificate.following import (
     CENTRES,
     INCH,
     NO_CENTRE,
     UNKNOWN_WORDS,
     AxisFollower,
-    Given,
 )
 from ncfix.certificate.formulas import value_of, variable_name
 from ncfix.certificate.holes import HoleCall
@@ -26,7 +26,6 @@ QUIET = frozenset((51, 80, 90, 150, 501, 600, 610, 611, 620, 640, 800, 911, 960,
     (4500, 4510, 6010, 6020, 6030, 6410, 6420, 6430, 6440, 6450)
 )
 """G codes, in tenths, that move nothing and change no coordinates, or are handled elsewhere."""
-CYCLES = re.compile("MCALL|CYCLE|HOLES|POCKET|SLOT|LONGHOLE")
 WORDS_QUIET = re.compile(
     r"MSG|SETMS|ORI(WKS|MKS|AXES|VECT|VIRT1)|SOFT|BRISK|DRIVE|FFWO(N|F)|COMP(OF|CAD|ON)|CFC|CFTCP|CFIN|"
     r"FNORM|FLIN|SUPA|ADIS|ADISPOS|CYCLE832|WALIMO(N|F)|STOPRE|PTP|CP|UPATH|SPOS|KONT|NORM"
@@ -58,7 +57,7 @@ class WordAddressFollower(AxisFollower):
         line = self.settled(line)
         codes = [round(10 * word.value) for word in line.codes if word.name == "G" and word.value is not None]
         if line.odd and (codes or line.path):
-            self.lost["odd"] = line.odd
+            self.lose(line.odd, rewritten=True)
         if self._smooths(line, codes) or self._changed_coordinates(line, codes):
             return None
         apart, fixed = self._modes(line, codes)
@@ -73,7 +72,7 @@ class WordAddressFollower(AxisFollower):
     def _motion(self, row: int, line: TextLine, words: Mapping[str, TextWord]) -> AxisStep:
         """The step of a line with a path, by the kind of motion in force."""
         if not words and self.kind is not Kind.ARC:
-            self.lost["odd"] = UNKNOWN_WORDS
+            self.lose(UNKNOWN_WORDS, rewritten=True)
             return self.step(row, Kind.FEED, dict(self.at), line, UNKNOWN_WORDS)
         if self.kind is None:
             return self.step(row, Kind.FEED, dict(self.at), line, "which motion this is")
@@ -98,7 +97,7 @@ class WordAddressFollower(AxisFollower):
             return self.called_hole(row, line, dict(self.at), call)
         else:
             self.foreign.add(row)
-            self.lost[cycle] = "a drilling cycle that this reader does not know"
+            self.lose("a drilling cycle that this reader does not know", rewritten=True, modal=True)
         return None
 
     def _hole_after(self, row: int, line: TextLine, words: Mapping[str, TextWord], call: HoleCall) -> AxisStep:
@@ -114,7 +113,7 @@ class WordAddressFollower(AxisFollower):
         name = variable_name(word.name)
         self.variables[name] = value_of(word.number, self.variables)
         if name[1:].isdecimal() and int(name[1:]) >= OF_THE_CONTROL:
-            self.lost["variable"] = "a variable of the control gets a value"
+            self.lose("a variable of the control gets a value")
 
     def _smooths(self, line: TextLine, codes: Sequence[int]) -> bool:
         """Whether a line only sets the smoothing of the path, and its axes (G5.1 Q2 X0 Y0)."""
@@ -293,8 +292,8 @@ class WordAddressFollower(AxisFollower):
                 case _ if self._took_mode(code) or self._took_system(code) or self._took_cycle(code) or code in QUIET:
                     pass
                 case _:
-                    why = f"G{code / 10:g} is not known to this reader"
-                    apart, self.lost[f"G{code / 10:g}"] = apart or why, why
+                    self.lose_by(f"G{code / 10:g}")
+                    apart = apart or f"G{code / 10:g} is not known to this reader"
         if self.tcp and not length_set and any(code in (540, 550, 560, 570) for code in codes):
             self.unsay("XYZ")
         return apart, fixed or any(word.name == "SUPA" for word in line.codes)
@@ -309,7 +308,7 @@ class WordAddressFollower(AxisFollower):
                 self.plane = code // 10
             case 200 | 210 | 700 | 710 | 7000 | 7100:
                 if code in (700, 710) and self.family is Family.WORDS:
-                    self.lost[f"G{code / 10:g}"] = f"G{code / 10:g} is not known to this reader"
+                    self.lose_by(f"G{code / 10:g}")
                 self.unit = INCH if code in (200, 700, 7000) else 1.0
             case 900 | 910:
                 self.counting = code == 910
@@ -362,7 +361,7 @@ class WordAddressFollower(AxisFollower):
         for word in line.codes:
             match word.name:
                 case "G" if word.value is None:
-                    self.lost["G"] = "a G code is a formula"
+                    self.lose("a G code is a formula")
                 case "F":
                     self.feed = word.value
                 case "T":
@@ -382,23 +381,24 @@ class WordAddressFollower(AxisFollower):
                     if self.turn is None or self.turn.tilted:
                         self.end_turn()
                     else:
-                        self.lost["frame"] = "CYCLE800 in turned coordinates"
+                        self.lose("CYCLE800 in turned coordinates")
                 case "MCALL":
                     self._modal_call(alone=[other.name for other in line.codes if other.name != "N"] == ["MCALL"])
                 case name if len(name) > 1:
                     self._sinumerik_word(word)
                 case name if name not in SINGLE:
-                    self.lost[name] = f"{name} is not known to this reader"
+                    self.lose_by(name)
 
     def _modal_call(self, alone: bool) -> None:
         """MCALL: alone it ends the modal call, also one that this reader could not follow."""
         if alone:
-            left = {key: why for key, why in self.lost.items() if not CYCLES.match(key)}
+            left = dict.fromkeys(loss for loss in self.lost if not loss.modal)
             if len(left) < len(self.lost):
                 self.forget()
             self.lost, self.modal_call = left, None
         else:
-            self.lost["MCALL"], self.modal_call = "a modal call", None
+            self.lose("a modal call", rewritten=True, modal=True)
+            self.modal_call = None
 
     def _sinumerik_word(self, word: TextWord) -> None:
         """Apply an assignment to a variable, or a word of SINUMERIK."""
@@ -406,20 +406,20 @@ class WordAddressFollower(AxisFollower):
         known[word.name] = value_of(word.number, known) if word.value is None and word.number else word.value
         name = word.name.partition("(")[0].strip()
         if not word.number and not WORDS_QUIET.fullmatch(name) and not name.startswith(("%", "_N_", "$")):
-            self.lost[name] = f"{name} is not known to this reader"
+            self.lose_by(name)
 
     def _system(self, name: str) -> None:
         if name != self.system:
             self.system = name
             if self.turn is not None:
-                self.lost["frame"] = "another work offset in turned coordinates"
+                self.lose("another work offset in turned coordinates")
         self.unsay()
 
     def _length_offset(self, line: TextLine, tcp: bool) -> None:
         number = line.code("H")
         tool = int(number) if number is not None else self.tool
         if any(word.name == "H" and word.value is None for word in line.codes):
-            self.lost["H"] = "a length offset is a formula"
+            self.lose("a length offset is a formula")
         if self.turn is not None and self.turn.tilted:
             self.forget_place("XY" if self.is_square() else "")  # the tip moves along the tool
         elif self.tcp and (tcp or self.given.tcp):

@@ -7,49 +7,24 @@ program uses anything else, it gives the reason in `AxisStep.why` and follows no
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
-from ncfix.arrays import Array, Mask
+from ncfix.arrays import Array, stops
+from ncfix.certificate.coordinates import FollowedAxes, Given
+from ncfix.certificate.flow import LineOrder
 from ncfix.certificate.formulas import value_of
 from ncfix.certificate.holes import HoleCall
 from ncfix.certificate.model import TipModel
 from ncfix.certificate.reading import AXES, JUMPS, Family, TextLine, TextWord
 from ncfix.certificate.steps import NAN, AxisStep, Kind, ModesInForce, ProgramSteps, StraightRun
 from ncfix.certificate.text import StraightLines, Text
-from ncfix.certificate.turning import TurnedFrame
-from ncfix.values import frozen
 
 INCH = 25.4
 CENTRES = {"X": "I", "Y": "J", "Z": "K"}
-
-
-@frozen
-class Given:
-    """Values outside the program: offsets, tool lengths, start and reference points by axis letter, mm and degree.
-
-    tools  tool lengths by number, or by name in upper case
-    skip   the switches of block delete that are on, or True: all, False: none; None: `prove` examines every position
-    """
-
-    offsets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    tools: Mapping[int | str, float | None] = field(default_factory=dict)
-    initial: Mapping[str, float] = field(default_factory=dict)
-    references: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    tcp: bool = False
-    assume_zero: bool = False
-    skip: bool | frozenset[int] | None = None
-    workpiece_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    inputs: Mapping[str, float] = field(default_factory=dict)
-    """Inputs of the error model, by name."""
-    pointless: bool = False
-    """Numbers without a decimal point count least increments: such programs are not followed."""
-    decimal_inches: bool = False
-    """A least increment of 0.001 mm becomes 0.0001 inch in blocks in inches."""
 
 
 def skips(switches: bool | frozenset[int] | None, line: TextLine) -> bool:
@@ -67,21 +42,19 @@ def positions(text: Text, given: Given) -> list[Given]:
     return [replace(given, skip=frozenset(on)) for on in every]
 
 
+MOST_TURNS = 4
+"""A line that is executed more often has to do the same from then on."""
 MOST_SWITCHES = 4
 """Largest number of switches of block delete whose positions are all examined, as by `fix`."""
 LEAST = 6
 """Least number of consecutive straight lines that are followed in columns."""
-REWRITTEN = re.compile(r"jumps|odd|end|MCALL|CYCLE|CYCL|HOLES|POCKET|SLOT|LONGHOLE|G11[012]|G16|CT|CIP|RND|CHF|AP|RP")
-"""Reasons for which a program is not followed any further, and behind which a correction may rewrite lines."""
 UNKNOWN_WORDS = "words that this reader does not know here"
 ROUND = 179.0
 """Turn, degrees, above which the shorter way may be the other one: half a turn minus a correction."""
-SQUARE = 2e-4
-"""Largest angle, rad, of a tool that is square to a plane: rotary words have three decimals of a degree."""
 NO_POLE, NO_CENTRE = "the pole is not known", "an arc without a centre"
 
 
-class AxisFollower:
+class AxisFollower(FollowedAxes):
     """A simple model of a control, one for each program; `run` returns the steps of the program.
 
     shortest   M126: rotary axes go the shorter way, which is ambiguous at half a turn
@@ -92,25 +65,11 @@ class AxisFollower:
     shortest = by_vector = ended = False
 
     def __init__(self, axes: Sequence[str], family: Family, given: Given, model: TipModel | None) -> None:
-        self.axes, self.family, self.given, self.model = tuple(axes), family, given, model
-        start = 0.0 if given.assume_zero else NAN
-        self.at = {axis: given.initial.get(axis, start) for axis in axes}
-        self.said = {axis: axis in given.initial and not given.assume_zero for axis in axes}
+        super().__init__(axes, family, given, model)
         self.kind: Kind | None = None
         self.clockwise = False
-        self.plane, self.unit, self.counting = 17, 1.0, False
-        self.system = {Family.WORDS: "G54", Family.SINUMERIK: "G500", Family.KLARTEXT: "PRESET"}[family]
-        if family is Family.KLARTEXT and "PRESET" not in given.offsets:
-            self.system = "G54"
-        self.tool: int | str = 0
+        self.plane = 17
         self.next_tool: int | str = 0
-        self.length: float | None = 0.0 if family is Family.WORDS else self.length_of(self.tool)
-        """The tool length in force in coordinates; SINUMERIK and Klartext begin with that of the tool in place."""
-        self.between = False
-        """The length offset in force is not that of the tool in the spindle, so the length of the tool is not sure."""
-        self.tcp = self.asks_tip = given.tcp
-        self.turn: TurnedFrame | None = None
-        """The turned coordinates in force; then `at` holds numbers of the program, not commands."""
         self.beside = False
         self.feed: float | None = None
         self.feed_mode = 94
@@ -123,59 +82,89 @@ class AxisFollower:
         self.modal_call: HoleCall | None = None
         """The cycle of MCALL, which follows each motion."""
         self.pole: dict[str, float] = {}
-        self.shifts: dict[str, float] = {}
-        """Shifts of axes by the program (G92, TRANS), mm or degree."""
-        self.local: dict[str, float] = {}
-        """Shifts of axes by G52, mm or degree."""
         self.variables: dict[str, float | None] = {}
         """Values of variables and parameters; None: not known."""
-        self.lost: dict[str, str] = {}
         self.foreign: set[int] = set()
         """Lines that a correction may rewrite in a form unknown to this reader."""
+        self.turns: dict[int, int] = {}
+        """How often lines are executed, where the program has loops or subprograms that are followed."""
         if given.pointless:
-            self.lost["points"] = "numbers without a decimal point count increments"
+            self.lose("numbers without a decimal point count increments")
 
-    def run(self, text: Text) -> ProgramSteps:
-        """The steps of a program."""
+    def run(self, text: Text, turn: int | None = None) -> ProgramSteps:
+        """Follow the lines of a program.
+
+        turn  where it has loops or subprograms: of each line comes what it does the first time (0), the second time,
+              ..., or the last time; None: these are not followed. Raises `NotPlainError`.
+        """
+        order = None if turn is None else LineOrder.of(text)
+        if turn is not None and order is not None:
+            return self._run_along(order, text.lines, turn)
         lines = text.lines
         if any(line.odd is JUMPS for _, line in text.apart()):
-            self.lost["jumps"] = JUMPS
+            self.lose(JUMPS, rewritten=True)
         log = ProgramSteps(lines, self.axes)
         straight = None if text.read is None or self.lost else text.read.straight(self.axes)
-        stops = [] if straight is None else _stops(straight.is_straight)
+        ends = [] if straight is None else stops(straight.is_straight).tolist()
         row, tried = 0, 0
         while row < len(lines):
-            if straight is not None and not self.lost and row >= tried and stops[row] - row >= LEAST:
-                run = self.straight_run(straight, row, stops[row])
+            if straight is not None and not self.lost and row >= tried and ends[row] - row >= LEAST:
+                run = self.straight_run(straight, row, ends[row])
                 if run is not None:
                     log.add_run(run)
-                    row = stops[row]
+                    row = ends[row]
                     continue
-                tried = row + 1 if self.kind is None or self.kind > Kind.FEED else stops[row]
-            self._line(row, lines[row], log)
+                tried = row + 1 if self.kind is None or self.kind > Kind.FEED else ends[row]
+            if (step := self._line(row, lines[row])) is not None:
+                log.add(step)
             row += 1
         return log.done()
 
-    def _line(self, row: int, line: TextLine, log: ProgramSteps) -> None:
+    def _run_along(self, order: LineOrder, lines: Sequence[TextLine], turn: int) -> ProgramSteps:
+        """Follow a program in the order in which its lines are executed."""
+        made: dict[int, list[AxisStep | None]] = {}
+        row = 0
+        while row < len(lines) and not self.ended:
+            call = self.calls.get(row)
+            made.setdefault(row, []).append(None if row in order.lines else self._line(row, lines[row]))
+            if call is not None and self.calls.get(row) != call:
+                self.foreign.add(row)
+            row = order.behind(row, self.variables)
+        self.lose("behind the end of the program", rewritten=True)
+        for row in range(len(lines)):
+            if row not in made and row not in order.lines:
+                made[row] = [self._line(row, lines[row])]
+        log = ProgramSteps(lines, self.axes)
+        for _, steps in sorted(made.items()):
+            step = steps[min(turn, len(steps) - 1)]
+            if step is not None:
+                last, *further = steps[MOST_TURNS - 1 :] or [step]
+                if last is None or not all(other is not None and last.is_like(other) for other in further):
+                    step.why = step.why or "a motion that is made in more ways than this reader looks at"
+                log.add(step)
+        self.turns = {row: len(steps) for row, steps in made.items()}
+        return log.done()
+
+    def _line(self, row: int, line: TextLine) -> AxisStep | None:
         """Follow one line, and log its step."""
         behind = self.ended and not (line.path or line.codes)  # the last % stays
-        if line.odd or (self.lost and not behind and any(map(REWRITTEN.match, self.lost))):
+        if line.odd or (not behind and self.is_rewritten):
             self.foreign.add(row)
         if line.skipped and self.given.skip is None:
-            self.lost["switches"] = "the program has too many switches of block delete"
+            self.lose("the program has too many switches of block delete")
         if skips(self.given.skip, line):
-            return
+            return None
         found = self.block(row, line)
         if self.ended:
-            self.lost["end"] = "behind the end of the program"
+            self.lose("behind the end of the program", rewritten=True)
         if found is not None:
             if self.turn is not None and not found.why and found.kind is not Kind.FIXED:
                 found = self.turn.step(found)
                 if self.turn.tilted and self.length != found.length:
                     found.why = "the length of the tool is not in force in a tilted plane"
-            log.add(found)
             if found.why:
                 self.forget()
+        return found
 
     def straight_run(self, lines: StraightLines, row: int, stop: int) -> StraightRun | None:
         """The steps of consecutive straight motions; None if they cannot be followed in columns."""
@@ -223,130 +212,6 @@ class AxisFollower:
 
     # -- common to all families ---------------------------------------------------------------------------------------
 
-    def forget(self) -> None:
-        """Mark the positions of all axes as not known."""
-        for axis in self.axes:
-            self.at[axis], self.said[axis] = NAN, False
-
-    def unsay(self, axes: str | tuple[str, ...] = ()) -> None:
-        """Mark the positions of these axes, or of all, as not set by the program."""
-        for axis in axes or self.axes:
-            if axis in self.said:
-                self.said[axis] = False
-
-    def offset(self, axis: str) -> float:
-        """The sum of all offsets that are added to the numbers of an axis, mm or degree; NaN if not known."""
-        system = self.given.offsets.get(self.system)
-        if system is None:
-            shift = 0.0 if self.given.assume_zero or self.system == "G500" else NAN
-        else:
-            shift = system.get(axis, 0.0)
-        if axis == "Z" and not self.tcp:
-            shift += NAN if self.length is None else self.length
-        if self.shifts or self.local:
-            shift += self.shifts.get(axis, 0.0) + self.local.get(axis, 0.0)
-        return shift
-
-    def length_of(self, tool: int | str) -> float | None:
-        """The length of a tool, mm; None if it is not given."""
-        found = self.given.tools.get(tool)
-        return 0.0 if found is None and self.given.assume_zero else found
-
-    def tip_length(self) -> float:
-        """The length of the tool in the spindle, mm; NaN if not known."""
-        length = None if self.between else self.length_of(self.tool)
-        return NAN if length is None else length
-
-    def lead(self, on: bool) -> None:
-        """Switch tool-centre-point control on or off, and convert the position to the new coordinates.
-
-        If the setup says that X Y Z are those of the tip, only Klartext can switch it off.
-        """
-        self.asks_tip = on
-        on = on or (self.turn is not None and self.turn.tilted)
-        if on == self.tcp or (self.given.tcp and self.family is not Family.KLARTEXT):
-            return
-        if self.turn is not None:
-            self.lost["frame"] = "tool-centre-point control in turned coordinates"
-        if self.family is not Family.KLARTEXT and (any(self.shifts.values()) or any(self.local.values())):
-            self.lost["shift"] = "a shift under tool-centre-point control"
-        self.tcp = on
-        known = [self.at[axis] for axis in self.axes]
-        numbers = self.model.turned(known, self.tip_length(), on) if self.model else [NAN] * len(known)
-        self.at.update((axis, number) for axis, number in zip(self.axes, numbers, strict=True) if axis in "XYZ")
-        self.unsay("XYZ")
-
-    def begin_turn(self, rotation: Array, origin: Sequence[float] = (0.0, 0.0, 0.0), *, tilted: bool) -> None:
-        """Turn the coordinates about the zero point, and move it by `origin` (3,), mm.
-
-        tilted  they are fixed to the workpiece, so that X Y Z are those of the tip
-        """
-        self.end_turn()
-        if self.model is None or (tilted and not self.model.leads):
-            self.lost["frame"] = "turned coordinates on a machine whose axes do not lead the tip everywhere"
-            return
-        if tilted:
-            asked = self.asks_tip
-            self.lead(True)
-            self.asks_tip = asked
-        zero = np.array([self.offset(axis) for axis in "XYZ"])
-        self._enter(TurnedFrame(self.model.columns, rotation, zero, zero + np.array(origin), tilted))
-
-    def begin_turn_about(self, rotation: Array, centre: Mapping[str, float]) -> None:
-        """Turn the coordinates about a centre, mm, whose numbers stay the same."""
-        self.end_turn()
-        middle = np.array([centre.get(axis, 0.0) for axis in "XYZ"])
-        if self.model is None or self.tcp:
-            self.lost["frame"] = "turned coordinates under tool-centre-point control"
-        else:
-            self._enter(TurnedFrame(self.model.columns, rotation, middle, middle, False))
-
-    def end_turn(self) -> None:
-        """End the turn of the coordinates."""
-        before, self.turn = self.turn, None
-        if before is not None:
-            self._stand_at(before.commands(np.array([[*self.at.values()]]))[0], before)
-            self.lead(self.asks_tip)
-
-    def _enter(self, turn: TurnedFrame) -> None:
-        self.turn = turn
-        self._stand_at(turn.numbers(np.array([*self.at.values()])), turn)
-
-    def _stand_at(self, place: Array, turn: TurnedFrame) -> None:
-        """Set the position (n_axes,) in new coordinates; numbers that change count as not set by the program."""
-        for k, axis in enumerate("XYZ"):
-            number = float(place[turn.columns[k]])
-            if number != self.at[axis]:
-                self.at[axis], self.said[axis] = number, False
-
-    def forget_place(self, but: str = "") -> None:
-        """Mark the positions of X, Y and Z, except those in `but`, as not known."""
-        for axis in "XYZ":
-            if axis not in but:
-                self.at[axis], self.said[axis] = NAN, False
-
-    def is_square(self) -> bool:
-        """Whether the tool is square to the tilted plane in force."""
-        way, here = None if self.model is None else self.model.rotary_way, self._turns()
-        if way is None or self.turn is None or not np.isfinite(here).all():
-            return False
-        return bool(np.abs(way.directions(here[None])[0] - self.turn.rotation[:, 2]).max() < SQUARE)
-
-    def _turns(self) -> Array:
-        """Positions of the rotary axes, rad."""
-        return np.radians([self.at[axis] for axis in self.axes if axis in "ABC"])
-
-    def square_to(
-        self, rotation: Array, *, sense: int = 0, sign: int = 0, inside: bool = False, stays: bool = True
-    ) -> dict[str, float]:
-        """Rotary positions, degrees, with the tool square to a plane, see `RotaryWay.to`; NaN if not known."""
-        turning = [axis for axis in self.axes if axis in "ABC"]
-        way, here = None if self.model is None else self.model.rotary_way, self._turns()
-        if way is None or not np.isfinite(here).all():
-            return dict.fromkeys(turning, NAN)
-        found = way.to(rotation[:, 2], here, sense=sense, sign=sign, inside=inside, stays=stays)
-        return dict(zip(turning, [NAN, NAN] if found is None else np.degrees(found).tolist(), strict=True))
-
     def settled(self, line: TextLine) -> TextLine:
         """The line with formulas replaced by their values, if the variables in them are known."""
         if line.plain or all(word.value is not None for word in line.path):
@@ -360,32 +225,13 @@ class AxisFollower:
         ]
         return replace(line, path=path)
 
-    def scale(self, axis: str) -> float:
-        """The unit of the words of an axis, mm or degree."""
-        return self.unit if axis in "XYZUVW" else 1.0
-
-    def target(self, words: Mapping[str, TextWord], machine: bool = False) -> dict[str, float]:
-        """The positions to which words lead, `machine`: in machine coordinates; marks axes that the program sets."""
-        end = dict(self.at)
-        for axis, word in words.items():
-            value = NAN if word.value is None else word.value * self.scale(axis)
-            counted = word.counted == "+" or (word.counted == "" and self.counting)
-            if machine:
-                end[axis] = value
-            elif counted:
-                end[axis] = self.at[axis] + value
-            else:
-                end[axis] = self.offset(axis) + value
-                self.said[axis] = True
-        return end
-
     def step(self, row: int, kind: Kind, end: dict[str, float], line: TextLine, why: str = "") -> AxisStep:
         """The step of a line that ends at `end`; `why`: the reason why it cannot be followed, if there is one."""
         named = {word.name: word for word in line.path if word.name in self.at}
         strange = next((word.name for word in line.path if word.name in AXES and word.name not in self.at), "")
         if not why and strange:
             why = f"the machine has no axis {strange}"
-        foreign = bool(line.odd) or any(REWRITTEN.match(key) for key in self.lost)
+        foreign = bool(line.odd) or self.is_rewritten
         if not why and line.odd:
             why = line.odd
         if not why and (twice := line.doubled()):
@@ -393,7 +239,7 @@ class AxisFollower:
         if not why and kind is not Kind.FIXED and any(word.value is None for word in line.path):
             why = "a word is a formula"
         if not why:
-            why = next(iter(self.lost.values()), "")
+            why = next((loss.why for loss in self.lost), "")
         if not why and self.shortest and self._goes_round(np.array([[*self.at.values()], [*end.values()]])):
             why = "a rotary axis goes the shorter way (M126)"
         step = AxisStep(
@@ -470,30 +316,8 @@ class AxisFollower:
             case 2 | 30:
                 self.ended = True
             case 96 | 97 | 98 | 99 | 198 if self.family is not Family.KLARTEXT:
-                self.lost["jumps"] = JUMPS
+                self.lose(JUMPS, rewritten=True)
             case None:
-                self.lost["M"] = "an M code is a formula"
+                self.lose("an M code is a formula")
             case _:
                 pass
-
-    def choose_edge(self, number: float | None) -> None:
-        """D of SINUMERIK: puts the length of the tool in force; with T0 or D0, none."""
-        self.new_length(self.length_of(self.tool) if number and self.tool else 0.0)
-
-    def new_length(self, length: float | None) -> None:
-        """Put a tool length in force in coordinates; it lies along Z of the machine, however they are turned."""
-        before, self.length, self.between = self.length, length, False
-        if self.turn is not None and not self.tcp and self.turn.rotation[2, 2] != 1.0:
-            place = self.turn.commands(np.array([[*self.at.values()]]))[0]
-            longer = np.array([0.0, 0.0, NAN if before is None or length is None else length - before])
-            self.turn = replace(self.turn, zero=self.turn.zero + longer, origin=self.turn.origin + longer)
-            self._stand_at(self.turn.numbers(place), self.turn)
-        self.unsay("Z" if not self.tcp or (self.turn is not None and self.is_square()) else "XYZ")
-
-
-def _stops(flags: Mask) -> list[int]:
-    """For each true flag, the end of the run of true flags in which it stands; for others, their own index."""
-    n = len(flags)
-    others = np.where(flags, n, np.arange(n))
-    found: list[int] = np.minimum.accumulate(others[::-1])[::-1].tolist()
-    return found

@@ -10,7 +10,7 @@ import numpy as np
 
 from ncfix.certificate.following import INCH, NO_POLE, AxisFollower
 from ncfix.certificate.holes import HoleCall, assign
-from ncfix.certificate.reading import AXES, RETRACTS, TextLine, TextWord
+from ncfix.certificate.reading import AXES, DECIMAL, RETRACTS, TextLine, TextWord
 from ncfix.certificate.steps import NAN, AxisStep, Kind, ProgramSteps
 from ncfix.certificate.text import Text
 from ncfix.certificate.turning import PlaneBlock, about
@@ -22,13 +22,13 @@ FRAMES = re.compile(r"CYCL DEF (?:7|8|9|10|11|13|19|26)\b|PLANE|TRANS|FUNCTION")
 
 
 TRANSFORMS = re.compile(r"CYCL DEF (7|10)\.[1-9][ \t]*(.*)")
-TRANSFORM_WORD = re.compile(r"(I?(?:[XYZ]|ROT))[ \t]*([+-]?[\d.,]+)")
+TRANSFORM_WORD = re.compile(rf"(I?(?:[XYZ]|ROT))[ \t]*({DECIMAL})(?![\d.,])")
 DATUM = re.compile(r"Q339 ?= ?\+?(\d+)[ \t]*(?:[;~]|$)")
 """The datum number of CYCL DEF 247."""
 TOOL = re.compile(r'TOOL CALL (?:(\d+)|"([^"]*)")')
 SPEED = re.compile(r"TOOL CALL (?:Z )?[SF][\d ]")
 """TOOL CALL without a tool, for another speed or feed."""
-OVERSIZE = re.compile(r"\bDL ?(?:([+-]?[\d.,]+)|[+-]?Q)")
+OVERSIZE = re.compile(rf"\bDL ?(?:({DECIMAL})(?![\d.,])|[+-]?Q|.)")
 """The oversize of the tool length in TOOL CALL."""
 
 
@@ -48,11 +48,11 @@ class KlartextFollower(AxisFollower):
     drilling = 0
     oversize = 0.0
 
-    def run(self, text: Text) -> ProgramSteps:
-        """The steps of a program."""
+    def run(self, text: Text, turn: int | None = None) -> ProgramSteps:
+        """Follow the lines of a program, as `AxisFollower` says."""
         if GOES_ON.search(text.source):
-            self.lost["odd"] = "a block goes on in the next line (~)"
-        return super().run(text)
+            self.lose("a block goes on in the next line (~)", rewritten=True)
+        return super().run(text, turn)
 
     def block(self, row: int, line: TextLine) -> AxisStep | None:
         """The step of one line; None if it moves nothing."""
@@ -81,7 +81,7 @@ class KlartextFollower(AxisFollower):
     def _odd(self, row: int, line: TextLine, lead: str) -> AxisStep | None:
         """The step of a line that cannot be parsed; behind M140, an axis is followed again once it gets a position."""
         if line.odd is not RETRACTS and line.rest.strip():
-            self.lost["frame" if FRAMES.match(lead) else "odd"] = line.odd
+            self.lose(line.odd, rewritten=not FRAMES.match(lead))
         if line.odd is not RETRACTS and not line.path:
             return None
         return self.step(row, Kind.FEED, dict(self.at), line, line.odd)
@@ -133,7 +133,7 @@ class KlartextFollower(AxisFollower):
         """Apply PLANE SPATIAL or RESET: begin a tilted plane, or end it; with TURN and MOVE the rotary axes turn."""
         plane = PlaneBlock.of(lead)
         if plane is None or (self.turn is not None and not self.turn.tilted):
-            self.lost["frame"] = "a plane that this reader does not know"
+            self.lose("a plane that this reader does not know")
             return
         turning = [axis for axis in self.axes if axis in "ABC"]
         rotation = np.eye(3) if plane.rotation is None else plane.rotation
@@ -159,13 +159,13 @@ class KlartextFollower(AxisFollower):
         """Apply a line of cycle 7, a datum shift, or of cycle 10, a rotation about the datum."""
         numbers = TRANSFORM_WORD.findall(text)
         if self.lost or self.tcp or "".join(map("".join, numbers)) != re.sub(r"[ \t]", "", text.partition(";")[0]):
-            self.lost["frame"] = f"cycle {cycle} in a form that this reader does not know"
+            self.lose(f"cycle {cycle} in a form that this reader does not know")
         elif cycle == "10" and "I" not in text:
             self.end_turn()
             if numbers and float(numbers[-1][1].replace(",", ".")):
                 self.begin_turn(about("Z", float(numbers[-1][1].replace(",", "."))), tilted=False)
         elif self.turn is not None or any("ROT" in name for name, _ in numbers):
-            self.lost["frame"] = f"cycle {cycle} in turned coordinates"
+            self.lose(f"cycle {cycle} in turned coordinates")
         else:
             for name, number in numbers:
                 counted, axis = name.startswith("I"), name[-1]
@@ -176,12 +176,12 @@ class KlartextFollower(AxisFollower):
     def _call_tool(self, lead: str) -> None:
         found, more = TOOL.match(lead), OVERSIZE.search(lead)
         if (more and more[1] is None) or not (found or more or (SPEED.match(lead) and not self.oversize)):
-            self.lost["tool"] = "a tool call without a tool or an oversize that this reader knows"
+            self.lose("a tool call without a tool or an oversize that this reader knows")
         elif found or more:
             if found:
                 self.tool = int(found[1]) if found[1] else found[2]
             if self.tcp:
-                self.lost["tool"] = "another tool while the tip is led (M128, TCPM)"
+                self.lose("another tool while the tip is led (M128, TCPM)")
             self.oversize = float(more[1].replace(",", ".")) * self.unit if more else 0.0
             self.new_length(self.length_of(self.tool))
             self.unsay()
@@ -294,11 +294,11 @@ class KlartextFollower(AxisFollower):
                     case 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 | 8 | 9 | 13 | 14 | 30 | 91 | 92 | 99 | 107 | 108 | 120:
                         self.auxiliary(word)
                     case _:
-                        self.lost[f"M{word.number}"] = f"M{word.number} is not known to this reader"
+                        self.lose_by(f"M{word.number}")
 
     def _set_pole(self, words: Mapping[str, TextWord]) -> None:
         if set(words) - {"X", "Y"}:
-            self.lost["pole"] = "a pole in another plane"
+            self.lose("a pole in another plane")
         said = dict(self.said)
         target = self.target(words)
         self.said = said

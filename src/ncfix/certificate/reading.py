@@ -196,10 +196,14 @@ SINUMERIK_FLOW = re.compile(
 )
 
 
+LABEL = re.compile(r"[ \t]*(?:N[ \t]*\d+[ \t]*)?[A-Z_]\w+[ \t]*:(?!=)", re.IGNORECASE)
+
+
 def _sinumerik(number: int, text: str) -> TextLine:
     line, marked = _marked(number, text)
+    label = LABEL.match(text)
     rest = _Rest(text)
-    for found in SINUMERIK_WORD.finditer(text):
+    for found in SINUMERIK_WORD.finditer(text, label.end() if label else 0):
         start, end = found.span()
         name = found[2] or found[7]
         if name is not None:

@@ -72,6 +72,15 @@ class AxisStep:
     turn: Array | None = None
     """(3, 3) rotation of the coordinates of the program; None: they are not turned."""
 
+    def is_like(self, other: AxisStep) -> bool:
+        """Whether another step of the same line does the same."""
+        here, there = (
+            np.array([*step.start, *step.end, *step.said, *step.centre, step.length, step.sweep, step.unit])
+            for step in (self, other)
+        )
+        ours, theirs = ((each.kind, each.why, each.tcp, each.feed, each.feed_mode) for each in (self, other))
+        return ours == theirs and np.array_equal(here, there, equal_nan=True) and self.turn is other.turn
+
     def lead_round(
         self, names: Sequence[str], plane: int, centre: Mapping[str, float], clockwise: bool, radius: float | None
     ) -> AxisStep:

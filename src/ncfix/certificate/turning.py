@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix.arrays import Array, Mask
+from ncfix.certificate.reading import DECIMAL, NUMBER
 from ncfix.certificate.steps import AxisStep, StraightRun
 from ncfix.values import frozen
 
@@ -119,10 +120,9 @@ class SwivelCall:
     def of(cls, call: str) -> SwivelCall | None:
         """From a call with plain numbers and consecutive rotations about three axes; None for any other call."""
         parts = [part.strip() for part in re.sub(r'"[^"]*"', "", call.partition("(")[2].rstrip(") \t")).split(",")]
-        try:
-            values = [float(part) if part else 0.0 for part in parts] + [0.0] * 14
-        except ValueError:
+        if not all(re.fullmatch(NUMBER, part) for part in parts if part):
             return None
+        values = [float(part) if part else 0.0 for part in parts] + [0.0] * 14
         mode, state, sense = int(values[3]), int(values[2]), int(values[13])
         axes = ["?XYZ"[mode >> shift & 3] for shift in (0, 2, 4)]
         if sense not in (-1, 1) or mode >> 6 or sorted(axes) != ["X", "Y", "Z"] or state % 10 or state // 100 % 10:
@@ -133,7 +133,7 @@ class SwivelCall:
 
 PLANE = re.compile(r"PLANE (?:SPATIAL|RESET)\b")
 PLANE_WORD = re.compile(
-    r"(?P<angle>SP[ABC]) ?(?P<size>[+-]?[\d.,]+)|(?P<turn>TURN|MOVE|STAY)|(?P<sign>SEQ|SYM) ?(?P<side>[+-])"
+    rf"(?P<angle>SP[ABC]) ?(?P<size>{DECIMAL})(?![\d.,])|(?P<turn>TURN|MOVE|STAY)|(?P<sign>SEQ|SYM) ?(?P<side>[+-])"
     r"|(?P<other>FMAX|F ?AUTO|F ?MAX|F ?\d+|MB ?MAX|(?:MB|DIST|ABST) ?[\d.,]+|TABLE ROT|COORD ROT)"
     r"|(?P<comment>;.*)|(?P<odd>\S+)"
 )

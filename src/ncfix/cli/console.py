@@ -24,12 +24,10 @@ from typing import Any, TextIO
 
 import click
 
-from ncfix.diagnostics import FaultError, Message, NcfixError, Place, PluginError, UsageError, visible
+from ncfix.diagnostics import FaultError, Message, NcfixError, Place, PluginError, UsageError, lines_named, visible
 from ncfix.files import unwritable
 from ncfix.plugins import blamed
 
-FEW_STRETCHES = 8
-"""Largest number of ranges of lines that are listed individually."""
 FIGURE = re.compile(r"(?<![-.\w])\d+(?:\.\d+)?(?:e[-+]\d+)?(?= (?:mm|um|degrees|times)\b(?!/))")
 """The quantity in a message."""
 SCHEMA = 1
@@ -64,9 +62,13 @@ def _as_one(group: Sequence[Message]) -> Message:
     most = max(group, key=lambda message: _size(message.text))
     if len(group) == 1:
         return most
-    lines = sorted({message.place.line for message in group if message.place})
+    import numpy as np
+
+    from ncfix.arrays import in_stretches
+
+    lines = np.unique([message.place.line for message in group if message.place])
     shown = "" if all(message.text == most.text for message in group) else "; the largest is shown"
-    return replace(most, text=f"{most.text} ({len(group)} times, {lines_named(lines)}{shown})")
+    return replace(most, text=f"{most.text} ({len(group)} times, {lines_named(in_stretches(lines))}{shown})")
 
 
 def _kind(text: str) -> str:
@@ -79,16 +81,6 @@ def _size(text: str) -> float:
     """The quantity in a text; 0 without one."""
     found = FIGURE.search(text)
     return float(found[0]) if found else 0.0
-
-
-def lines_named(lines: Sequence[int]) -> str:
-    """Line numbers in words, consecutive ones as ranges: "lines 3 to 5, 9"."""
-    begins = [line for before, line in zip((None, *lines), lines, strict=False) if before is None or line > before + 1]
-    ends = [line for line, after in zip(lines, (*lines[1:], None), strict=True) if after is None or after > line + 1]
-    if len(begins) > FEW_STRETCHES:
-        return f"between lines {lines[0]} and {lines[-1]}"
-    parts = [str(a) if a == b else f"{a} to {b}" for a, b in zip(begins, ends, strict=True)]
-    return f"line{'s' if len(lines) > 1 else ''} {', '.join(parts)}"
 
 
 class ReaderGoneError(Exception):

@@ -148,7 +148,7 @@ def _executors() -> Iterable[str]:
 )
 @click.option("--diff", is_flag=True, help="Print how the text would change (unified diff); write nothing.")
 @click.option("--diff-motions", is_flag=True, help="Print which commands would change, and why; write nothing.")
-@click.option("--no-figures", "verify", is_flag=True, flag_value=False, default=True, help="Leave out the tip errors.")
+@click.option("--no-figures", "figures", is_flag=True, flag_value=False, default=True, help="Leave out the tip errors.")
 @click.option(
     "-j",
     "--jobs",

@@ -18,7 +18,7 @@ class FixOptions:
     flatten        write the program out flat where blocks are executed from several states (`driver.fix_flat`)
     block_numbers  numbers of inserted blocks, in languages that number every block: "same" as the block that is split,
                    "none", or "renumber" all blocks
-    verify         simulate the written program along the whole path (before and after figures)
+    figures        simulate the written program along the whole path (before and after figures)
 
     Raises `UsageError` NCF025.
     """
@@ -30,7 +30,7 @@ class FixOptions:
     split_rapids: bool = False
     flatten: bool = False
     block_numbers: str = "same"
-    verify: bool = True
+    figures: bool = True
 
     def __post_init__(self) -> None:
         TOLERANCE_UM.check("tolerance_um", self.tolerance_um)

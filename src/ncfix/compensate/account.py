@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.arrays import Array, Index, Ints, Mask
+from ncfix.arrays import Array, Index, Mask, in_stretches
 from ncfix.control.moves import PASS_RULES, MotionKind, Moves, Pass, Rule
-from ncfix.diagnostics import Message, Place
+from ncfix.diagnostics import Message, Place, lines_named
 from ncfix.text.tree import Program
 from ncfix.values import frozen
 
@@ -134,7 +134,7 @@ class LeftAxis:
             many = f"this motion, which {'cuts' if self.cuts else 'cuts nothing'}"
         else:
             cutting = {0: "none", self.motions: "all"}.get(self.cuts, self.cuts)
-            many = f"{self.motions} motions ({self._where()}), {cutting} of which cut"
+            many = f"{self.motions} motions ({lines_named(self.stretches, MAX_STRETCHES)}), {cutting} of which cut"
         most = max(each.most for each in (self, *others))
         far = f"{np.degrees(most):.4g} degrees" if self.rotary else f"{most * 1e3:.2f} um"
         they, are, stand = ("they", "are", "stand") if others else ("it", "is", "stands")
@@ -145,11 +145,6 @@ class LeftAxis:
             f"the program has not said where {they} {are}, or the control offsets or rounds the contour there"
         )
         return Message("NCF439", text, Place(path, self.first), HINT if self.cuts else "")
-
-    def _where(self) -> str:
-        if len(self.stretches) > MAX_STRETCHES:
-            return f"between lines {self.first} and {self.last}"
-        return "lines " + ", ".join(str(a) if a == b else f"{a} to {b}" for a, b in self.stretches)
 
     def as_dict(self) -> dict[str, object]:
         """Plain data, for `--json`."""
@@ -187,13 +182,6 @@ def stretches_of(program: Program, blocks: NDArray[np.int32]) -> tuple[tuple[int
     """The lines of blocks as (first, last) of each stretch without gaps."""
     lines = np.sort(program.lines(blocks))
     return in_stretches(lines[np.diff(lines, prepend=-1) != 0])
-
-
-def in_stretches(lines: Ints) -> tuple[tuple[int, int], ...]:
-    """Lines in ascending order as (first, last) of each stretch without gaps."""
-    begins = np.flatnonzero(np.diff(lines, prepend=-1) > 1)
-    ends = np.append(begins[1:], len(lines)) - 1
-    return tuple(zip(lines[begins].tolist(), lines[ends].tolist(), strict=True))
 
 
 def merged(before: tuple[tuple[int, int], ...], later: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:

@@ -35,7 +35,7 @@ from ncfix.values import frozen, mutable
 
 SUSPECTED = "NCF438"
 """Code of the suspicion that a program was corrected before; not reported for a program with a stamp."""
-OPTIONS = FixOptions(force=True, verify=False)
+OPTIONS = FixOptions(force=True, figures=False)
 """Options of the trial correction that shows what would be refused."""
 
 

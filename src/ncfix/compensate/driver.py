@@ -186,7 +186,7 @@ class Corrector:
             own = np.ones(len(solution.moves), dtype=bool)
             own[:1] = False
         tally.add(part.program, joint, own, self.machine)
-        if task.options.verify:
+        if task.options.figures:
             path_errors = list[tuple[Moves, PathError]]()
             for each in joint.plans:
                 shown = each.shown(task.options.split_rapids)
@@ -391,7 +391,7 @@ class PartCorrector(Corrector):
         self.parts_proof.check(part, solution, text, plain.splices)
         tally = Tally(self.machine.least_increment[0])
         tally.add_plain(part.program, solution, largest_shift(plan, plain), plan.intent)
-        if self.task.options.verify:
+        if self.task.options.figures:
             self.note(tally, part.program, (moves, figures(plan, plain, self.task.options.split_rapids)))
         if self.watch is not None:
             self.watch(part.program, solution, None)

@@ -307,7 +307,7 @@ class Tally:
 
     def report(self, path: str, messages: tuple[Message, ...], options: FixOptions) -> FixReport:
         """The report. `messages`: the messages from following the program."""
-        figures = options.verify
+        figures = options.figures
         after = self.after.as_dict(self.way, self.samples) | {"where": self.after.line}
         still = [] if self.moves else [each for each in messages if each.code == NEVER]
         uncorrected = [  # if nothing in it moves, what was meant stays uncorrected

@@ -125,13 +125,13 @@ def _html_arrows(part: ArrowMap) -> str:
     x = EDGE + inner / 2 + inner * (part.x - (part.x.max() + part.x.min()) / 2) / wide
     y = PANEL - EDGE - inner / 2 - inner * (part.y - (part.y.max() + part.y.min()) / 2) / wide
     drawn = []
-    for k, (title, shifts) in enumerate(part.shifts.items()):
+    for k, ((title, shifts), colour) in enumerate(zip(part.shifts.items(), cycle(COLOURS), strict=False)):
         left, ends = PANEL * k, np.stack([x, y], axis=1) + shifts * [scale, -scale]
         drawn.append(f'<text x="{left + PANEL / 2}" y="14" text-anchor="middle">{escape(title)}</text>')
         for a, b, (c, d) in zip(x.tolist(), y.tolist(), ends.tolist(), strict=True):
             drawn.append(
-                f'<line x1="{left + a:.1f}" y1="{b:.1f}" x2="{left + c:.1f}" y2="{d:.1f}" stroke="{COLOURS[k]}"/>'
-                f'<circle cx="{left + a:.1f}" cy="{b:.1f}" r="1.2" fill="{COLOURS[k]}"/>'
+                f'<line x1="{left + a:.1f}" y1="{b:.1f}" x2="{left + c:.1f}" y2="{d:.1f}" stroke="{colour}"/>'
+                f'<circle cx="{left + a:.1f}" cy="{b:.1f}" r="1.2" fill="{colour}"/>'
             )
         drawn.append(
             f'<text x="{left + PANEL / 2}" y="{PANEL - 4}" text-anchor="middle">{escape(part.across)}</text>'
@@ -139,7 +139,7 @@ def _html_arrows(part: ArrowMap) -> str:
             f'transform="rotate(-90 {left + 12} {PANEL / 2})">{escape(part.up)}</text>'
         )
     size = f'width="{PANEL * len(part.shifts)}" height="{PANEL}"'
-    said = f"{part.caption} The longest arrow is {LONGEST / scale:.1f} {part.unit}; both panels have one scale."
+    said = f"{part.caption} The longest arrow is {LONGEST / scale:.1f} {part.unit}; all panels have one scale."
     picture = f'<svg {size} font-size="11" fill="#555" role="img">{"".join(drawn)}</svg>'
     return f"<figure>{picture}<figcaption>{escape(said)}</figcaption></figure>"
 

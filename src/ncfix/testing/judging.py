@@ -41,7 +41,7 @@ basis = "constant"
 coefficients = [{2}]
 """
 LINEAR = (("X", "1, 0, 0"), ("Y", "0, 1, 0"), ("Z", "0, 0, 1"))
-OPTIONS = FixOptions(tolerance_um=60.0, verify=False)
+OPTIONS = FixOptions(tolerance_um=60.0, figures=False)
 
 SYSTEMS = ("G54", "G55", "G54.1P1", "G54.1P2", "G500", "preset")
 SETUP = Setup(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import core
-from ncfix.arrays import Array, Bytes, Ints, Mask
+from ncfix.arrays import Array, Bytes, Ints, Mask, stops
 from ncfix.control.moves import FeedMode, Frame, MotionKind, Moves, Rule
 from ncfix.control.turns import turns_alone
 from ncfix.text.spelling import (
@@ -73,7 +73,7 @@ class Bulk:
         if moves.spelled is not None:
             fit &= ~moves.spelled.any(axis=1)
         fit = with_dwells(fit, program, moves, pieces, first_piece, layouts)
-        stop = _stops(fit & ~jumps.any(axis=1) if jumps.any() else fit)
+        stop = stops(fit & ~jumps.any(axis=1) if jumps.any() else fit)
         wordless = moves.wordless
         silenced = (wordless[1:] & ~wordless[:-1]).any(axis=1)  # an axis gets no word behind a motion that may give one
         changes = np.append(np.flatnonzero((np.diff(frame) != 0) | silenced) + 1, len(moves))
@@ -123,7 +123,7 @@ class Bulk:
         if language.one_by_one is not None:
             fit &= ~language.one_by_one(program, moves, pieces, first_piece)
         fit = with_dwells(fit, program, moves, pieces, first_piece, layouts)
-        return cls(program, moves, pieces, first_piece, layouts, _stops(fit))
+        return cls(program, moves, pieces, first_piece, layouts, stops(fit))
 
     def take(self, row: int, position: Array, frame: FrameMap, decimals: Ints) -> Array | None:
         """Write the stretch that begins with motion `row` as far as it is certain, without the centres of arcs.
@@ -225,12 +225,6 @@ class Bulk:
         rows = blocks[several > 0].astype(np.int64)
         leads = places_of(self.program, rows, self.layouts.leads) - self.program.blocks[rows, 0]
         return lines * line + int((several[several > 0] * leads).sum())
-
-
-def _stops(fit: Mask) -> Ints:
-    """(n + 1,) for each motion, and after the last one, the first from there on that is not `fit` (n,)."""
-    ends = np.append(np.flatnonzero(~fit), len(fit))
-    return np.repeat(ends, np.diff(ends, prepend=-1))
 
 
 def _is_plain(frame: Frame) -> bool:

@@ -135,7 +135,7 @@ def test_a_contour_is_refused_as_it_stands_and_followed() -> None:
 
 
 def test_a_contour_is_written_out_flat_and_corrected() -> None:
-    result = fix_flat(read(program(THREE_CIRCLES), "t.h", "heidenhain"), THREE, KNOWN, FixOptions(verify=False))
+    result = fix_flat(read(program(THREE_CIRCLES), "t.h", "heidenhain"), THREE, KNOWN, FixOptions(figures=False))
     assert result.report.refused == ()
     text = result.text.decode()
     assert "FLT" not in text
@@ -149,7 +149,7 @@ def test_a_contour_is_written_out_flat_and_corrected() -> None:
 
 def test_the_pole_is_put_back() -> None:
     body = "L X+0 Y+0 Z+0 FMAX\nCC X+1 Y+1\nL X+10 F100\nFCT DR+ R10 CCA90\nLP PR+30 PA+0\nL X+0 Y+0 Z+0"
-    result = fix_flat(read(program(body), "t.h", "heidenhain"), THREE, KNOWN, FixOptions(verify=False))
+    result = fix_flat(read(program(body), "t.h", "heidenhain"), THREE, KNOWN, FixOptions(figures=False))
     assert result.report.refused == ()
     assert follow(body).moves.end[3, :2] == pytest.approx([31, 1])
 

@@ -38,7 +38,7 @@ def test_new_words_have_a_sign_and_the_mark_of_the_program() -> None:
 
 def test_the_stamp_follows_the_first_block() -> None:
     for text in (program("L X+100 FMAX"), b"0 BEGIN PGM 5 MM\r\n1 L X+100 FMAX\r\n2 END PGM 5 MM\r\n"):
-        found = fix_program(read(text, "t.h"), THREE, KNOWN, FixOptions(verify=False)).text.splitlines()
+        found = fix_program(read(text, "t.h"), THREE, KNOWN, FixOptions(figures=False)).text.splitlines()
         assert found[0] == text.splitlines()[0]
         assert found[1].startswith(b"; ncfix ")
 
@@ -218,7 +218,7 @@ def test_polar_lines_become_cartesian() -> None:
 @pytest.mark.parametrize("body", ["L Z+100 FMAX M91", "CC X+1 Y+1", "TOOL CALL 3 Z S500", "LBL 5\nLBL 0"])
 def test_what_does_not_move_in_the_workpiece_keeps_its_bytes(body: str) -> None:
     text = program("L X+100 Y+0 Z+0 FMAX\n" + body)
-    found = fix_program(read(text, "t.h"), THREE, KNOWN, FixOptions(verify=False)).text
+    found = fix_program(read(text, "t.h"), THREE, KNOWN, FixOptions(figures=False)).text
     assert all(line.encode() in found for line in body.splitlines())
 
 
@@ -254,7 +254,7 @@ def test_a_corrected_program_is_not_corrected_again() -> None:
 )
 def test_block_numbers_as_asked_for(choice: str, numbers: list[str]) -> None:
     text = b"5 BEGIN PGM T MM\n10 L X-300 Y+0 Z+0 FMAX\n20 L X+300 F500\n\n/7 L Y+5\n9 END PGM T MM\n"
-    options = FixOptions(block_numbers=choice, verify=False)
+    options = FixOptions(block_numbers=choice, figures=False)
     found = fix_program(read(text, "t.h"), THREE, KNOWN, options).text.decode().splitlines()
     moves = [line.split()[0] for line in found if " L " in f" {line}"]
     if choice == "renumber":

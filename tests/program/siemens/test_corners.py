@@ -27,7 +27,7 @@ def machine(root: Path) -> Machine:
 def corrected(body: str, machine: Machine, head: str = HEAD) -> tuple[Moves, Moves, str]:
     """The motions of a program and of what it is corrected to, and that text."""
     program = read(f"{head}{body}\nM30\n".encode(), "part.mpf", "siemens")
-    fixed = fix_program(program, machine, SETUP, FixOptions(tolerance_um=0.5, verify=False))
+    fixed = fix_program(program, machine, SETUP, FixOptions(tolerance_um=0.5, figures=False))
     assert not fixed.report.refused
     both = (follow(each, machine, SETUP).trace.moves for each in (program, read(fixed.text, "part.mpf", "siemens")))
     before, after = both

@@ -21,7 +21,7 @@ def fixed(body: str, flat: bool = False) -> Fixed:
     source = f"G54 G0 X1 Y2 Z50\n{body}\nG0 Z60\nM30\n".encode()
     program = read(source, "part.mpf", "siemens")
     return (fix_flat if flat else fix_program)(
-        program, shifted_machine(), SETUP, FixOptions(tolerance_um=50, verify=False)
+        program, shifted_machine(), SETUP, FixOptions(tolerance_um=50, figures=False)
     )
 
 

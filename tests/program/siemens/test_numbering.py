@@ -53,7 +53,7 @@ def test_a_corrected_program_jumps_where_it_did(root: Path) -> None:
     )
     program = read(text.encode(), "part.mpf", "siemens")
     both = [
-        fix_program(program, machine, setup, FixOptions(block_numbers=numbers, tolerance_um=0.3, verify=False)).text
+        fix_program(program, machine, setup, FixOptions(block_numbers=numbers, tolerance_um=0.3, figures=False)).text
         for numbers in ("none", "renumber")
     ]
     assert both[0].count(b"\n") > text.count("\n") + 1, "blocks are put in"

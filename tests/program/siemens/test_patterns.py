@@ -60,7 +60,7 @@ def test_places_one_by_one() -> None:
 def test_pockets_at_places_of_a_pattern(machine: Machine) -> None:
     head = HEAD.replace("CYCLE81(10,0,2,-5)", "POCKET4(10,0,2,-5,8)")
     program = read(f"{head}HOLES2(0,0,20,0,0,3)\n{TAIL}".encode(), "part.mpf", "siemens")
-    fixed = fix_flat(program, machine, SETUP, FixOptions(verify=False, flatten=True))
+    fixed = fix_flat(program, machine, SETUP, FixOptions(figures=False, flatten=True))
     assert not fixed.report.refused
     assert fixed.text.count(b"\nG0 X") == 5  # before, at three places, and behind
     assert b"HOLES2" not in fixed.text
@@ -104,12 +104,12 @@ def test_in_another_plane() -> None:
 )
 def test_patterns_that_are_refused(head: str, body: str, machine: Machine) -> None:
     program = read(f"{head}{body}\n{TAIL}".encode(), "part.mpf", "siemens")
-    fixed = fix_flat(program, machine, SETUP, FixOptions(verify=False, flatten=True))
+    fixed = fix_flat(program, machine, SETUP, FixOptions(figures=False, flatten=True))
     assert any("places the control makes up" in refusal.reason for refusal in fixed.report.refused)
 
 
 def test_as_it_stands_it_is_refused_and_what_follows_must_name_its_axes(machine: Machine) -> None:
     program = read(f"{HEAD}HOLES2(0,0,10,0,0,3)\nMCALL\nG1 X3 F100\nG1 X3 Y4\nM30\n".encode(), "part.mpf", "siemens")
-    refused = fix_program(program, machine, SETUP, FixOptions(verify=False)).report.refused
+    refused = fix_program(program, machine, SETUP, FixOptions(figures=False)).report.refused
     assert [each.line for each in refused if "--flatten" in each.reason] == [5]
     assert {each.line for each in refused} >= {5, 7}

@@ -73,7 +73,7 @@ def test_what_is_written_is_read_as_meant(machine: Machine, strategy: str) -> No
     for seed in range(SEEDS, SEEDS + some(40)):
         try:
             program = read(text_of(seed).encode(), "part.mpf", "siemens")
-            fix_program(program, machine, SETUP, FixOptions(strategy=strategy, verify=False))
+            fix_program(program, machine, SETUP, FixOptions(strategy=strategy, figures=False))
         except NcfixError:
             continue
         fixed += 1
@@ -104,5 +104,5 @@ ODD = {
 def test_odd_programs_are_followed_to_their_end(name: str, strategy: str, machine: Machine) -> None:
     program = read(f"{ODD[name]}\nM30\n".encode(), "part.mpf", "siemens")
     setup = replace(SETUP, initial={}, assume_zero=True)
-    fixed = fix_program(program, machine, setup, FixOptions(strategy=strategy, verify=False))
+    fixed = fix_program(program, machine, setup, FixOptions(strategy=strategy, figures=False))
     assert fixed.changed or fixed.report.refused  # what a refused CT begins from stays as it is

@@ -53,7 +53,7 @@ def test_most_of_them_go_through_the_fast_lane() -> None:
 @pytest.mark.parametrize("offset", [0.0, 30.0])
 @pytest.mark.parametrize("strategy", ["rotary-then-linear", "full"])
 def test_many_at_a_time_they_are_written_as_one_by_one(strategy: str, offset: float) -> None:
-    options = FixOptions(strategy=strategy, allow_refused=True, verify=False)
+    options = FixOptions(strategy=strategy, allow_refused=True, figures=False)
     setup = Setup(work_offsets={"G54": {"C": offset}}, assume_zero=True)
     program = read(wandering(2, "A").encode(), "part.mpf", "siemens")
 

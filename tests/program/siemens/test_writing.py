@@ -23,7 +23,7 @@ def written(body: str) -> str:
     """The body of a program, corrected by -12.4, 21.3 and 8.5 um."""
     source = f"G54 G0 X1 Y2 Z50\n{body}\nM30\n".encode()
     fixed = fix_program(
-        read(source, "part.mpf", "siemens"), shifted_machine(), SETUP, FixOptions(tolerance_um=50, verify=False)
+        read(source, "part.mpf", "siemens"), shifted_machine(), SETUP, FixOptions(tolerance_um=50, figures=False)
     )
     assert not fixed.report.refused
     lines = [line for line in fixed.text.decode().splitlines() if "ncfix" not in line]
@@ -77,7 +77,7 @@ def test_a_turn_past_zero_is_not_split(turn: str) -> None:
     """The control counts from 0 to 360 degrees again after it: pieces in plain degrees would turn once more."""
     source = f"G54 G0 X10 Y0 Z100 A0 C10\nG1 F2000 X12 C={turn}\nX20 C=IC(90)\nM30\n".encode()
     program = read(source, "part.mpf", "siemens")
-    text = fix_program(program, load(CRADLE), Setup(assume_zero=True), FixOptions(verify=False)).text.decode()
+    text = fix_program(program, load(CRADLE), Setup(assume_zero=True), FixOptions(figures=False)).text.decode()
     after = text.split(f"C={turn}")[1].splitlines()
     assert "C=IC(" in after[1]
     (step,) = re.findall(r"C=IC\(([\d.]+)\)", text)
@@ -94,7 +94,7 @@ def on_the_cradle(body: str) -> tuple[str, Moves]:
     """A corrected program, the direction of the tool included, and its motions."""
     source = f"T1 D1 M6\nG54\nTRAORI\nORIAXES\n{body}\nM30\n".encode()
     cradle, setup = load(CRADLE), Setup(tools={1: Tool(80.0)}, assume_zero=True)
-    options = FixOptions(strategy="full", verify=False)
+    options = FixOptions(strategy="full", figures=False)
     fixed = fix_program(read(source, "part.mpf", "siemens"), cradle, setup, options)
     assert not fixed.report.refused
     again = read(fixed.text, "part.mpf", "siemens")
@@ -138,7 +138,7 @@ def test_a_turn_that_hardly_turns_does_not_go_the_other_way_round() -> None:
 def test_directions_are_taken_or_refused_in_words(block: str, given: dict[str, float], why: str) -> None:
     source = f"T1 D1 M6\nG54\nTRAORI\nG0 X0 Y0 Z40 A5 C5\n{block}\nG0 Z50 A5 C5\nM30\n".encode()
     setup = Setup(tools={1: Tool(80.0)}, variables=given, assume_zero=True)
-    fixed = fix_program(read(source, "part.mpf", "siemens"), load(CRADLE), setup, FixOptions(verify=False))
+    fixed = fix_program(read(source, "part.mpf", "siemens"), load(CRADLE), setup, FixOptions(figures=False))
     reasons = [refusal.reason for refusal in fixed.report.refused]
     assert all(why in reason for reason in reasons)
     assert bool(reasons) == bool(why)

@@ -12,7 +12,7 @@ from ncfix.diagnostics import ExitCode, Message, Place
 from ncfix.values import frozen
 
 if TYPE_CHECKING:
-    from ncfix.certificate.following import Given
+    from ncfix.certificate.coordinates import Given
     from ncfix.cli.targets import OutputTarget
     from ncfix.control.setup import Setup
     from ncfix.machine import Machine
@@ -24,7 +24,7 @@ SUFFIX = ".certificate.json"
 
 def given_of(setup: Setup, dialect: Dialect) -> Given:
     """The data of the setup in the form of the second reader."""
-    from ncfix.certificate.following import Given
+    from ncfix.certificate.coordinates import Given
 
     tools: dict[int | str, float | None] = {number: tool.length for number, tool in setup.tools.items()}
     tools |= {str(number): tool.length for number, tool in setup.tools.items()}

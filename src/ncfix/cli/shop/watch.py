@@ -42,7 +42,7 @@ td { border-top: 1px solid #8886; overflow-wrap: anywhere } .failed, .refused { 
 TAKEN = frozenset(
     {
         *("machine_path", "dialect", "strategy", "thesis", "tolerance_um", "split_rapids", "flatten", "block_numbers"),
-        *("allow_refused", "verify", "jobs", "executor", "time_limit_s", "memory_limit_mb"),
+        *("allow_refused", "figures", "jobs", "executor", "time_limit_s", "memory_limit_mb"),
     }
 )
 """Parameters of `fix` that `watch` has, too, in addition to those of the setup."""
@@ -255,7 +255,7 @@ class _Watching:
         from ncfix.cli.shop.batch import FixJob, ProgramLimits
         from ncfix.compensate import FixOptions
 
-        names = ("tolerance_um", "split_rapids", "flatten", "block_numbers", "allow_refused", "verify")
+        names = ("tolerance_um", "split_rapids", "flatten", "block_numbers", "allow_refused", "figures")
         chosen = {name: self.options[name] for name in names}
         strategy = "thesis" if self.options["thesis"] else self.options["strategy"]
         machine = sound(load_machine(machine_path), machine_path, force=False)
