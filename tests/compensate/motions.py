@@ -16,7 +16,7 @@ from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.path import PathTolerance, Plan, Requirements
 from ncfix.compensate.plan.strategies import Strategy
 from ncfix.compensate.plan.written import Known, WrittenPieces
-from ncfix.control.moves import FeedMode, Frame, MotionKind, Moves, Rule
+from ncfix.control.moves import NEUTRAL, FeedMode, Frame, MotionKind, Moves, Rule, neutral_column
 from ncfix.machine import Machine, State
 from ncfix.writer.pieces import Pieces
 
@@ -86,6 +86,8 @@ def motions(
         modal=np.full(n, 10, dtype=np.int16),
         frames=(Frame(np.zeros(width), np.eye(3), 1.0),),
         reasons=("",),
+        counted=np.zeros((n, width), dtype=bool),
+        **{name: neutral_column(name, n, width) for name in NEUTRAL},
     )
 
 
@@ -106,7 +108,9 @@ def _end_of(arc: Arc, start: np.ndarray, xyz: list[int], normal: np.ndarray, rot
 
 
 def changed(moves: Moves, **columns: object) -> Moves:
-    """The motions with columns replaced."""
+    """The motions with columns replaced; words of `incremental` ones count for all axes, unless `counted` is given."""
+    if "incremental" in columns and "counted" not in columns:
+        columns["counted"] = np.repeat(np.asarray(columns["incremental"])[:, None], len(moves.axes), axis=1)
     return replace(moves, **columns)
 
 

@@ -47,8 +47,6 @@ def fixed(text: str, machine: Machine, dialect: str) -> tuple[str, Moves, Moves]
 
 def heights_off(before: Moves, after: Moves, machine: Machine) -> np.ndarray:
     """How far the tip is from where it should be at R of each hole, along Z, mm."""
-    assert before.approach is not None
-    assert after.approach is not None
     meant, done = (moves.approach[moves.kind == MotionKind.CYCLE] for moves in (before, after))
     return machine.actual_tip(done)[:, 2] - machine.tip(meant, 0.0)[:, 2]
 
@@ -84,8 +82,6 @@ def test_linuxcnc_still_goes_up_before_it_goes_over(machine: Machine) -> None:
     """Behind G99 it does if it stands no higher than R: an R that sinks by a hair would lead through the clamp."""
     holes = "".join(f"G99 G81 X{x} Y0 Z-3 R2\nG98 X{-x} Y{y}\n" for x, y in ((150, 100), (-150, 20), (80, -90)))
     _, before, after = fixed(f"{HEAD}F100 {holes}G80\nM2\n", machine, "linuxcnc")
-    assert before.approach is not None
-    assert after.approach is not None
     stood, level = after.start[:, 2], after.approach[:, 2]
     there = before.start[:, 2] == before.approach[:, 2]
     assert there.sum() == 3
@@ -97,8 +93,6 @@ def test_the_level_in_a_tilted_plane(root: Path) -> None:
     holes = "G99 G81 X5. Y5. Z-4. R2. F100.\nX40.\nG80\nG0 Z60.\nG69\n"
     text = "G21 G90 G17 G94 G54\nG0 Z150. X0. Y0. A0. C0.\nG43 H1\nG68.2 X0. Y0. Z0. I0. J30. K0.\nG53.1\nG0 Z60.\n"
     _, before, after = fixed(f"{text}G0 X5. Y5.\n{holes}M2\n", machine, "fanuc")
-    assert before.approach is not None
-    assert after.approach is not None
     shift = (after.approach - before.approach)[before.kind == MotionKind.CYCLE]
     assert (np.abs(shift) > 0.0005).any()
     assert (np.abs(shift) < 0.1).all()

@@ -31,7 +31,7 @@ def test_what_columns_say_together() -> None:
     for row in range(n):
         passes, dwell = full.rule[row] == Rule.PASS, full.kind[row] == MotionKind.DWELL
         assert full.cutting[row] == (not passes and not dwell and full.kind[row] != MotionKind.RAPID)
-        assert full.call_of(row) is (None if full.call is None or full.call[row] < 0 else CALLS[full.call[row]])
+        assert full.call_of(row) is (None if full.call[row] < 0 else CALLS[full.call[row]])
         assert short.call_of(row) is None
         assert full.about_fixed_point[row] == (full.arc_absolute[row] or more["fixed_centre"][row])
         assert short.about_fixed_point[row] == short.arc_absolute[row]

@@ -408,7 +408,7 @@ class Claims:
                 most = JUMP if figure is None else float(figure[1]) / 1e3 + FIGURE
                 whole[note.place.line] = max(whole.get(note.place.line, 0.0), most)
         cuts = passed & (moves.kind != MotionKind.RAPID)
-        lawful = np.zeros(len(moves), dtype=bool) if moves.passing is None else np.isin(moves.passing, list(LAWFUL))
+        lawful = np.isin(moves.passing, list(LAWFUL))
         return cls(
             frozenset(refusal.line for refusal in report.refused),
             frozenset(lines[passed].tolist()),

@@ -309,7 +309,6 @@ def test_an_axis_that_must_get_no_word_from_a_motion_on_gets_none() -> None:
     """X rests from the third motion on, where a correction of the second has left it."""
     program, moves = followed(b"G90 G21 G94 G1 F1000 X0 Y0 Z0 B0 C0\nX1 B1\nB2 Y1\nB3\nM2\n")
     moves = replace(moves, resting=np.zeros_like(moves.programmed))
-    assert moves.resting is not None
     moves.resting[2:, 0] = True
     end = moves.end.copy()
     end[1, 0] += 0.5
@@ -322,7 +321,6 @@ def test_words_that_an_axis_gets_though_it_stands_there() -> None:
     """Told to spell out Z, where it stands already, a motion is written by itself; the others are not."""
     program, moves = followed(b"G90 G21 G94 G1 F1000 X0 Y0 Z0 B0 C0\nX1\nX2\nX3\nM2\n")
     moves = replace(moves, spelled=np.zeros_like(moves.programmed))
-    assert moves.spelled is not None
     moves.spelled[2, 2] = True
     for text, _ in written_from(program, moves, in_one_piece_each(moves, moves.end.copy())):
         assert text.splitlines()[1:4] == ["X1", "X2 Z0.000", "X3"]

@@ -67,8 +67,6 @@ def test_both_lanes_agree(name: str, machine: Machine) -> None:
     blocks = [line.format(10 + n // 3, n % 20) for n in range(60)]
     head, tail = TEXTS[name].split(ALIKE if name != "heidenhain" else KLARTEXT)
     many, single = (both(head + between.join(blocks) + tail, name, machine)[0] for between in ("", other))
-    assert many.resting is not None
-    assert single.resting is not None
     assert np.array_equal(many.resting, single.resting)
     assert 20 < many.resting.any(axis=1).sum() < 60
 
@@ -98,7 +96,6 @@ def test_the_radius_of_contours(dialect: str, text: str, radius: float | None) -
         dialect,
     )
     moves = trace(program, setup, tuple("XYZ"), frozenset()).moves
-    assert moves.beside is not None
     offsets = moves.beside[moves.beside != 0]
     assert len(offsets) == 2
     assert np.isnan(offsets).all() if radius is None else np.allclose(offsets, radius)

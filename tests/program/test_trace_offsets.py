@@ -200,7 +200,6 @@ def test_impossible_words(text: str) -> None:
 
 def test_an_axis_whose_datum_a_reset_does_not_move_stays_where_the_program_has_brought_it() -> None:
     followed = follow("G0 X1 Y2 Z3\nG92 X0\nG1 X4 F1\nG92.1\nG1 Z1\nG1 X2")
-    assert followed.moves.placed is not None
     assert followed.moves.placed[-2].tolist() == [False, True, True]
     assert followed.moves.placed[-1].tolist() == [True, True, True]
 
@@ -230,8 +229,7 @@ def test_under_tcp_a_control_leads_the_tip_of_the_tool_that_it_knows_of(text: st
 def test_behind_a_change_of_what_numbers_count_from_axes_have_to_be_named_again(change: str, placed: list[bool]):
     """A tool length counts along Z: until a block names Z, it gets no word. A shift in numbers changes nothing."""
     moves = follow(f"G1 X1 Y1 Z1 F9\n{change}\nX2", tools={2: Tool(50.0)}).moves
-    found = np.ones(3, dtype=bool) if moves.placed is None else moves.placed[-1]
-    assert found.tolist() == placed
+    assert moves.placed[-1].tolist() == placed
 
 
 NUMBERED = {number: Tool(10.0 * number, 3.0) for number in range(5)}

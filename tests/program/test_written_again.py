@@ -159,7 +159,7 @@ def corrected(rng: np.random.Generator, moves: Moves, size: float, *, arc_pieces
         if size and not round_[row]:
             off = (centre[piece] - start - way / 2) @ way
             centre[piece] -= way * off / (way @ way)
-    approach = None if moves.approach is None else moves.approach[move] + shift[move]
+    approach = moves.approach[move] + shift[move]
     fraction = np.where(last, 1.0, 0.5)
     return Pieces(move, fraction, end, is_arc[move], centre, unchanged[move], approach=approach)
 
@@ -210,7 +210,7 @@ def assert_understood(moves: Moves, pieces: Pieces, emission: Emission, again: M
     free = ~(pieces.unchanged | arc)[:, None] & ~moves.wordless[row]
     assert (np.abs(emission.end - pieces.end) < coarser * HALF)[free].all()
     assert np.abs(emission.centre - pieces.centre)[arc].max(initial=0.0) < 2.1 * coarser * STEP[0]
-    if moves.approach is not None and pieces.approach is not None and again.approach is not None:
+    if pieces.approach is not None:
         holes = np.flatnonzero(moves.kind[row] == MotionKind.CYCLE)
         level, wanted, begun = again.approach[holes, 2], pieces.approach[holes, 2], emission.start[row[holes], 2]
         assert (level > wanted - coarser * HALF[2]).all()

@@ -40,7 +40,7 @@ class NoFigureReason(NamedTuple):
 
 def rule_of(moves: Moves, row: int) -> NoFigureReason:
     """The rule by which motion `row` passes."""
-    rule = Pass.NONE if moves.passing is None else Pass(int(moves.passing[row]))
+    rule = Pass(int(moves.passing[row]))
     return (
         NoFigureReason(BY_RULE, True)
         if rule is Pass.NONE
@@ -55,7 +55,7 @@ def at_feed(moves: Moves) -> Mask:
 
 def at_measured_places(moves: Moves) -> Mask:
     """(n,) motions with a word that is computed from the machine's own measurement, and so contains its errors."""
-    return np.zeros(len(moves), dtype=bool) if moves.measured is None else np.any(moves.measured, axis=1)
+    return np.any(moves.measured, axis=1)
 
 
 def without_figure(moves: Moves, unchanged: Mask, left: Mask | None, own: Mask | None = None) -> Counter[str]:

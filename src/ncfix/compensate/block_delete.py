@@ -295,7 +295,7 @@ def _restricted(moves: Moves, whole: set[int], spelled: Mapping[int, Mask], rest
         moves = replace(moves, compensated=moves.compensated | np.isin(moves.block, list(whole)))
     if resting:
         rests = np.isin(moves.block, list(resting))[:, None] & ~moves.programmed
-        moves = replace(moves, resting=rests if moves.resting is None else moves.resting | rests)
+        moves = replace(moves, resting=moves.resting | rests)
     if not spelled:
         return moves
     named = np.zeros(moves.end.shape, dtype=np.bool_)
@@ -309,10 +309,8 @@ def _passing(moves: Moves, blocks: set[int]) -> Moves:
     if not blocks:
         return moves
     rows = np.isin(moves.block, list(blocks)) & (moves.rule == Rule.CORRECT)
-    passing = np.zeros(len(moves), dtype=np.int8) if moves.passing is None else moves.passing
-    return replace(
-        moves, rule=np.where(rows, Rule.PASS, moves.rule), passing=np.where(rows, Pass.SKIPPED, passing).astype(np.int8)
-    )
+    passing = np.where(rows, Pass.SKIPPED, moves.passing).astype(np.int8)
+    return replace(moves, rule=np.where(rows, Rule.PASS, moves.rule), passing=passing)
 
 
 def _only_rapids(moves: Moves, block: int) -> bool:

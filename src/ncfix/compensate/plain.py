@@ -265,7 +265,7 @@ class Planner:
         """The plan of a part; None if the part needs the full plan."""
         part, moves = continued.part, continued.part.moves
         plain = None if continued.head is None else plain_ones(continued.head.moves, moves)
-        if continued.head is None or plain is None or moves.beside is not None:
+        if continued.head is None or plain is None or moves.beside.any():
             return None
         commands, tcp = np.concatenate([continued.head.moves.end, moves.end]), bool(moves.tcp[0])
         poses = MotionEnds.of(self.machine, float(moves.tool_length[0]), commands, tcp)
@@ -450,11 +450,9 @@ def _may_be_planned(moves: Moves) -> bool:
     """Whether all motions are dwells, or are corrected from a known start to an absolute target."""
     rule = (moves.rule != Rule.CORRECT) & (moves.kind != MotionKind.DWELL)
     special = moves.incremental | rule | (moves.kind == MotionKind.CYCLE) | moves.beside_tip
-    columns = moves.approach, moves.counted, moves.resting
-    if special.any() or not all(each is None or not np.any(each) for each in columns):
+    if special.any() or moves.counted.any() or moves.resting.any():
         return False
-    untimed = (moves.feed_mode != FeedMode.INVERSE_TIME).all()
-    return bool(untimed and (moves.placed is None or moves.placed.all()))
+    return bool(moves.placed.all() and (moves.feed_mode != FeedMode.INVERSE_TIME).all())
 
 
 def _are_straight(moves: Moves) -> Mask:

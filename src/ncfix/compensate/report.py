@@ -186,7 +186,7 @@ def as_written(solution: WrittenPlan) -> Iterator[Finding]:
     if timed := solution.emission.timed:
         yield Finding.of("NCF456", np.array(timed, dtype=np.intp), TIMED, HAS_G93)
     stops, pieces = solution.moves.exact_stop, solution.plan.pieces
-    if stops is not None and (rows := np.flatnonzero(stops & (np.bincount(pieces.move) > 1))).size:
+    if (rows := np.flatnonzero(stops & (np.bincount(pieces.move, minlength=len(stops)) > 1))).size:
         yield Finding.of("NCF283", rows, STOPS, MARKS)
 
 

@@ -403,7 +403,7 @@ def increments(machine: Machine) -> Array:
 def _by_rule(moves: Moves) -> dict[int, Reason]:
     reasons: dict[int, Reason] = {}
     relative = (moves.kind == MotionKind.CYCLE) & moves.incremental & (moves.rule == Rule.CORRECT)
-    relative &= True if moves.call is None else moves.call < 0
+    relative &= moves.call < 0
     _explain(reasons, moves.block[relative].tolist(), CODE_OF_RULE, RELATIVE_CYCLE)
     for row in np.flatnonzero(moves.rule == Rule.REFUSE):
         _explain(reasons, [int(moves.block[row])], CODE_OF_RULE, moves.reasons[moves.reason[row]])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ncfix.arrays import Array, Ints, Mask
 from ncfix.control.coordinates import INDEX, N_LETTERS, Rotation, Vector
-from ncfix.control.moves import Arc, CycleCall, Frame, MotionKind, Moves, Pass, Rule
+from ncfix.control.moves import Arc, CycleCall, Frame, MotionKind, Moves, Pass, Rule, neutral_column
 from ncfix.control.turns import Winding, extremes, half_turns
 from ncfix.values import mutable
 
@@ -244,15 +244,9 @@ class MotionBuilder:
         start, end = _joined_ends(parts, self.columns)
         named = (np.arange(1 << N_LETTERS)[:, None] >> np.array(self.columns)) & 1 != 0
         styles: dict[str, Any] = self._style_columns(style)
-        for name in ("passing", "exact_stop"):
-            if not styles[name].any():
-                styles[name] = None
-        if not styles["beside"].any():
-            styles["beside"] = styles["across"] = None
-        if np.isnan(styles["tcp_length"]).all():
-            styles["tcp_length"] = None
         programmed = named.take(mask, axis=0, mode="clip")
-        counted = self._mask_column(self._counted, styles["incremental"])
+        n, width = len(block), len(self.columns)
+        counted = self._mask_column(self._counted, np.broadcast_to(styles["incremental"][:, None], (n, width)))
         angles = self._keep_whole(styles, programmed, counted, start, end, block)
         centre, normal, sweep = self._arc_columns(len(block))
         fixed = [row for row, arc in self._arcs.items() if arc.fixed]
@@ -273,16 +267,17 @@ class MotionBuilder:
                 for offset, rotation, unit, diameter, increments in self._frames
             ),
             reasons=tuple(self._reasons),
-            pointing=None,
-            approach=_sparse(self._approaches, len(block), np.nan, np.float64),
-            placed=(~named).take(unplaced, axis=0, mode="clip") if unplaced.any() else None,
-            fixed_centre=_sparse(dict.fromkeys(fixed, True), len(block), False, np.bool_),
+            approach=_sparse(self._approaches, neutral_column("approach", n, width)),
+            placed=(~named).take(unplaced, axis=0, mode="clip"),
+            fixed_centre=_sparse(dict.fromkeys(fixed, True), neutral_column("fixed_centre", n, width)),
             counted=counted,
-            measured=self._mask_column(self._measured, np.zeros(len(block), dtype=np.bool_)),
-            angles=angles,
-            resting=self._mask_column(self._resting, np.zeros(len(block), dtype=np.bool_)),
-            call=_sparse(self._called, len(block), -1, np.int32),
+            measured=self._mask_column(self._measured, neutral_column("measured", n, width)),
+            resting=self._mask_column(self._resting, neutral_column("resting", n, width)),
+            call=_sparse(self._called, neutral_column("call", n, width)),
+            spelled=neutral_column("spelled", n, width),
+            words_alone_turn=neutral_column("words_alone_turn", n, width),
             calls=tuple(self._calls),
+            angles=angles,
             **styles,
         )
 
@@ -302,7 +297,7 @@ class MotionBuilder:
         self,
         styles: dict[str, NDArray[Any]],
         programmed: Mask,
-        counted: Mask | None,
+        counted: Mask,
         start: Array,
         end: Array,
         block: Ints,
@@ -315,13 +310,9 @@ class MotionBuilder:
             return None
         turning, free = np.flatnonzero(self.rolls), styles["rule"] != Rule.PASS
         start, end = start[:, turning], end[:, turning]
-        directed = (
-            np.broadcast_to(styles["incremental"][:, None], end.shape) if counted is None else counted[:, turning]
-        )
-        if self._directed:
-            directed = directed.copy()
-            for first, stop, axes in self._directed:
-                directed[first:stop] |= [bool(axes >> self.columns[column] & 1) for column in turning]
+        directed = counted[:, turning]
+        for first, stop, axes in self._directed:
+            directed[first:stop] |= [bool(axes >> self.columns[column] & 1) for column in turning]
         plain, cuts = programmed[:, turning] & ~directed, styles["kind"] != MotionKind.RAPID
         offsets = np.array([offset for offset, *_ in self._frames] or [(0.0,) * len(self.columns)])[:, turning]
         offset = offsets if len(offsets) == 1 else offsets[styles["frame"]]
@@ -340,14 +331,11 @@ class MotionBuilder:
         angles[turning] = extremes(plain, end - offset)
         return angles
 
-    def _mask_column(self, masks: dict[int, int], otherwise: Mask) -> Mask | None:
-        """(n, n_axes) from bit masks of some motions; the others take `otherwise` (n,). None if no mask is set."""
-        if not masks:
-            return None
-        column = np.repeat(otherwise[:, None], len(self.columns), axis=1)
+    def _mask_column(self, masks: dict[int, int], neutral: Mask) -> Mask:
+        """(n, n_axes) the bit masks of some motions as flags; the others keep those of `neutral`."""
         bits = np.array([1 << column for column in self.columns], dtype=np.int64)
-        column[list(masks)] = (np.array(list(masks.values()), dtype=np.int64)[:, None] & bits) != 0
-        return column
+        flags = (np.array(list(masks.values()), dtype=np.int64)[:, None] & bits) != 0
+        return _sparse(dict(zip(masks, flags, strict=True)), neutral)
 
     def _arc_columns(self, count: int) -> tuple[Array, Array, Array]:
         rows, nowhere, none = list(self._arcs), np.broadcast_to(np.nan, (count, 3)), np.broadcast_to(np.nan, count)
@@ -367,13 +355,12 @@ def _first(block: Ints, rows: Mask, known: int | None) -> int | None:
     return int(block[found[0]]) if known is None and found.size else known
 
 
-def _sparse(values: Mapping[int, Any], count: int, otherwise: float, kind: type[np.generic]) -> NDArray[Any] | None:
-    """A column (count, ...) with the values of some rows and `otherwise` elsewhere; None if no row has a value."""
+def _sparse(values: Mapping[int, Any], neutral: NDArray[Any]) -> NDArray[Any]:
+    """The column `neutral`, with the `values` of some rows in their place."""
     if not values:
-        return None
-    own = np.array(list(values.values()), dtype=kind)
-    column = np.full((count, *own.shape[1:]), otherwise, dtype=kind)
-    column[list(values)] = own
+        return neutral
+    column = neutral.copy()
+    column[list(values)] = list(values.values())
     return column
 
 

@@ -18,7 +18,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from enum import IntEnum
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,32 +164,31 @@ class Moves:
     frames       all frames in use
     reasons      all reasons in use
     rotary_as_programmed  (n,) rotary axes must stay as programmed: linear axes would not follow them (a swivelled plane
-                 without tool-centre-point control). None: nowhere
-    pointing     how the rotary axes point the tool, if programs give its direction as a vector
+                 without tool-centre-point control)
     approach     (n, n_axes) of canned cycles: the command over the hole at level R, from which it feeds and to which it
-                 may return; NaN elsewhere, and if no word of the block gives such a level. None: nowhere
+                 may return; NaN elsewhere, and if no word of the block gives such a level
     placed       (n, n_axes) the program itself has positioned the axis, in the coordinates in force: only then may it
-                 get a word that its block lacks (see `Places`). None: everywhere
-    fixed_centre (n,) of arcs: a word gives the centre itself, not its distance from the start. None: where
-    `arc_absolute`
-    counted      (n, n_axes) words of the axis are increments, if that differs within a block. None: as `incremental`
+                 get a word that its block lacks (see `Places`)
+    fixed_centre (n,) of arcs: a word gives the centre itself, not its distance from the start
+    counted      (n, n_axes) words of the axis are increments: those of all axes, or of some in a block
     resting      (n, n_axes) axes that must stay at rest whatever the words say (see `control.control`), or that cannot
-                 have words in the block: rotary axes in many cycles. None: nowhere
+                 have words in the block: rotary axes in many cycles
     beside       (n,) offset of a compensated contour to the left of the path, mm: negative to the right, NaN if not
-                 known, 0 without compensation. None: nowhere
-    across       (n,) index (X Y Z of the program) of the normal to the plane of such contours. None: nowhere
-    passing      (n,) the rule by which a motion passes (`Pass`). None: no motion passes, or the rule is not recorded
+                 known, 0 without compensation
+    across       (n,) index (X Y Z of the program) of the normal to the plane of such contours
+    passing      (n,) the rule by which a motion passes (`Pass`); `Pass.NONE` if it does not, or none is recorded
     measured     (n, n_axes) axes whose words are computed from measured values: `end` is nominal, and the words stay
-                 unchanged, because the measured values contain the machine's error. None: nowhere
+                 unchanged, because the measured values contain the machine's error
+    call         (n,) of canned cycles whose depth is in the block of a call: index into `calls`, else -1
+    spelled      (n, n_axes) axes that get a word even if it would not move them
+    tcp_length   (n,) mm, the length the control uses for X Y Z under TCP, if that is not the tool's: zero while no
+                 length offset is in force, so that it moves the spindle reference, not the tip; else NaN
+    exact_stop   (n,) the control stops at the end of every motion (G60, G61)
+    words_alone_turn  (n,) rotary axes get a word only if the block has a word for one of them
+    calls        all such calls
+    pointing     how the rotary axes point the tool; None unless programs give its direction as a vector
     angles       (n_axes, 2) smallest and largest angle, rad, of absolute words for rotary axes that the control may
                  count from 0 to 360 degrees; NaN for other axes. None: no such axes
-    call         (n,) of canned cycles whose depth is in the block of a call: index into `calls`, else -1. None: nowhere
-    calls        all such calls
-    spelled      (n, n_axes) axes that get a word even if it would not move them. None: nowhere
-    tcp_length   (n,) mm, the length the control uses for X Y Z under TCP, if that is not the tool's: zero while no
-                 length offset is in force, so that it moves the spindle reference, not the tip; else NaN. None: nowhere
-    exact_stop   (n,) the control stops at the end of every motion (G60, G61). None: nowhere
-    words_alone_turn  (n,) rotary axes get a word only if the block has a word for one of them. None: nowhere
     """
 
     axes: tuple[str, ...]
@@ -216,24 +215,24 @@ class Moves:
     modal: NDArray[np.int16]
     frames: tuple[Frame, ...]
     reasons: tuple[str, ...]
-    rotary_as_programmed: Mask | None = None
-    pointing: Pointing | None = None
-    approach: Array | None = None
-    placed: Mask | None = None
-    fixed_centre: Mask | None = None
-    counted: Mask | None = None
-    measured: Mask | None = None
-    resting: Mask | None = None
-    angles: Array | None = None
-    passing: Signs | None = None
-    beside: Array | None = None
-    across: Signs | None = None
-    call: NDArray[np.int32] | None = None
+    rotary_as_programmed: Mask
+    approach: Array
+    placed: Mask
+    fixed_centre: Mask
+    counted: Mask
+    resting: Mask
+    beside: Array
+    across: Signs
+    passing: Signs
+    measured: Mask
+    call: NDArray[np.int32]
+    spelled: Mask
+    tcp_length: Array
+    exact_stop: Mask
+    words_alone_turn: Mask
     calls: tuple[CycleCall, ...] = ()
-    spelled: Mask | None = None
-    tcp_length: Array | None = None
-    exact_stop: Mask | None = None
-    words_alone_turn: Mask | None = None
+    pointing: Pointing | None = None
+    angles: Array | None = None
 
     def __len__(self) -> int:
         return len(self.block)
@@ -241,13 +240,12 @@ class Moves:
     @property
     def length_under_tcp(self) -> Array:
         """(n,) mm, the tool length to which X Y Z refer under TCP."""
-        own = self.tcp_length
-        return self.tool_length if own is None else np.where(np.isnan(own), self.tool_length, own)
+        return np.where(np.isnan(self.tcp_length), self.tool_length, self.tcp_length)
 
     @property
     def beside_tip(self) -> Mask:
         """(n,) whether X Y Z refer to a point other than the tip, although TCP is on."""
-        return np.zeros(len(self), dtype=bool) if self.tcp_length is None else self.tcp & ~np.isnan(self.tcp_length)
+        return self.tcp & ~np.isnan(self.tcp_length)
 
     @property
     def wordless(self) -> Mask:
@@ -255,35 +253,27 @@ class Moves:
 
         An axis that must rest may have a word, which must keep its position.
         """
-        wordless: Mask = np.zeros(self.end.shape, dtype=bool)
-        if self.placed is not None:
-            wordless = ~(self.placed | self.programmed)
-        return wordless if self.resting is None else wordless | self.resting
+        return ~(self.placed | self.programmed) | self.resting
 
     @property
     def idle(self) -> Mask:
         """(n, n_axes) axes that no correction can move: `wordless` ones, and rotary axes that get no words here."""
-        if self.words_alone_turn is None:
-            return self.wordless
         rests = self.words_alone_turn & ~self.programmed[:, self.rotary].any(axis=1)
         return self.wordless | (self.rotary & rests[:, None])
 
     @property
     def increments(self) -> Mask:
         """(n, n_axes) axes along which the displacement does not depend on where the motion starts."""
-        counted = self.incremental[:, None] if self.counted is None else self.counted
-        return np.broadcast_to(counted & (self.rule != Rule.PASS)[:, None], self.end.shape)
+        return self.counted & (self.rule != Rule.PASS)[:, None]
 
     @property
     def about_fixed_point(self) -> Mask:
         """(n,) arcs whose centre is given by words, wherever they start."""
-        if self.fixed_centre is None:
-            return self.arc_absolute
         return self.arc_absolute | self.fixed_centre
 
     def call_of(self, row: int) -> CycleCall | None:
         """The cycle call that a motion belongs to, if the call has a block of its own; else None."""
-        return None if self.call is None or self.call[row] < 0 else self.calls[self.call[row]]
+        return None if self.call[row] < 0 else self.calls[self.call[row]]
 
     def refused(self, rows: Mask, why: str) -> Moves:
         """The motions with `rows` (n,) refused, as far as they would have been corrected."""
@@ -307,6 +297,32 @@ class Moves:
         passed = np.flatnonzero((self.rule == Rule.PASS) & (self.kind != MotionKind.DWELL))
         moved[passed[~self.programmed[passed].any(axis=1)]] = True
         return moved
+
+
+NEUTRAL: dict[str, tuple[bool, float, type[np.generic]]] = {
+    "rotary_as_programmed": (False, False, np.bool_),
+    "approach": (True, math.nan, np.float64),
+    "placed": (True, True, np.bool_),
+    "fixed_centre": (False, False, np.bool_),
+    "resting": (True, False, np.bool_),
+    "beside": (False, 0.0, np.float64),
+    "across": (False, 2, np.int8),
+    "passing": (False, 0, np.int8),
+    "measured": (True, False, np.bool_),
+    "call": (False, -1, np.int32),
+    "spelled": (True, False, np.bool_),
+    "tcp_length": (False, math.nan, np.float64),
+    "exact_stop": (False, False, np.bool_),
+    "words_alone_turn": (False, False, np.bool_),
+}
+"""Columns of `Moves` that few programs need: whether they have a value for each axis, the value that changes nothing,
+and its type."""
+
+
+def neutral_column(name: str, count: int, n_axes: int) -> NDArray[Any]:
+    """A column of `NEUTRAL` that changes nothing, (count,) or (count, n_axes); read-only, it takes no memory."""
+    by_axis, value, kind = NEUTRAL[name]
+    return np.broadcast_to(np.array(value, dtype=kind), (count, n_axes) if by_axis else (count,))
 
 
 @frozen

@@ -13,7 +13,6 @@ from dataclasses import field, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix.arrays import Array, Index, Mask
 from ncfix.control.control import ProgramControl
@@ -149,40 +148,13 @@ def joined_moves(parts: list[Moves], blocks: list[int]) -> Moves:
         return parts[0]
     before = np.cumsum([0, *blocks[:-1]])
     columns: dict[str, Any] = {
-        each.name: _joined_columns(each.name, parts) for each in fields(Moves) if each.name not in TABLES
+        each.name: np.concatenate([getattr(part, each.name) for part in parts])
+        for each in fields(Moves)
+        if each.name not in TABLES
     }
     shifted = [part.block + at for part, at in zip(parts, before.tolist(), strict=True)]
     columns["block"] = np.concatenate(shifted).astype(np.int32)
     return Moves(**columns, **{name: getattr(parts[-1], name) for name in TABLES})
-
-
-LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
-    "rotary_as_programmed": lambda moves: np.zeros(len(moves), dtype=np.bool_),
-    "words_alone_turn": lambda moves: np.zeros(len(moves), dtype=np.bool_),
-    "approach": lambda moves: np.full(moves.end.shape, np.nan),
-    "placed": lambda moves: np.ones(moves.end.shape, dtype=np.bool_),
-    "spelled": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
-    "resting": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
-    "measured": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
-    "passing": lambda moves: np.zeros(len(moves), dtype=np.int8),
-    "beside": lambda moves: np.zeros(len(moves)),
-    "across": lambda moves: np.full(len(moves), 2, dtype=np.int8),
-    "tcp_length": lambda moves: np.full(len(moves), np.nan),
-    "exact_stop": lambda moves: np.zeros(len(moves), dtype=np.bool_),
-    "fixed_centre": lambda moves: np.zeros(len(moves), dtype=np.bool_),
-    "call": lambda moves: np.full(len(moves), -1, dtype=np.int32),
-    "counted": lambda moves: np.repeat(moves.incremental[:, None], len(moves.axes), axis=1),
-}
-"""Values of the optional columns of `Moves` that None stands for."""
-
-
-def _joined_columns(name: str, parts: list[Moves]) -> NDArray[Any] | None:
-    """One column of consecutive parts; None if no part has it."""
-    columns = [getattr(part, name) for part in parts]
-    if all(column is None for column in columns):
-        return None
-    filled = (LACKING[name](part) if column is None else column for part, column in zip(parts, columns, strict=True))
-    return np.concatenate(list(filled))
 
 
 def last_of(program: Program, moves: Moves) -> tuple[Program, Moves]:

@@ -70,8 +70,7 @@ class Bulk:
         fit &= np.array([_is_plain(each) for each in frames], dtype=np.bool_)[frame] if len(moves) else False
         if language.one_by_one is not None and fit.any():
             fit &= ~language.one_by_one(program, moves, pieces, first_piece)
-        if moves.spelled is not None:
-            fit &= ~moves.spelled.any(axis=1)
+        fit &= ~moves.spelled.any(axis=1)
         fit = with_dwells(fit, program, moves, pieces, first_piece, layouts)
         stop = stops(fit & ~jumps.any(axis=1) if jumps.any() else fit)
         wordless = moves.wordless

@@ -362,8 +362,8 @@ class _Emitter:
             offset=frame.frame.offset,
             wordless=tuple(wordless.tolist()),
             call=call,
-            measured=() if moves.measured is None else tuple(moves.measured[row].tolist()),
-            spelled=() if moves.spelled is None else tuple(moves.spelled[row].tolist()),
+            measured=tuple(moves.measured[row].tolist()),
+            spelled=tuple(moves.spelled[row].tolist()),
             level=self.levels.wanted(
                 row, rows.start, at, frame, as_programmed, self.position, self.program.dialect.cycle_of(modal).level
             ),

@@ -334,7 +334,7 @@ class RetractLevels:
         address  address of the level's word
         """
         moves, approach = self.moves, self.pieces.approach
-        if approach is None or moves.approach is None or not np.isfinite(approach[piece]).all():
+        if approach is None or not np.isfinite(approach[piece]).all():
             return None
         nominal = as_programmed.program(moves.approach[row].copy())
         across = int(np.argmax(np.abs(nominal - as_programmed.program(moves.end[row].copy()))))
@@ -352,7 +352,7 @@ class RetractLevels:
     def comes_back(self, row: int) -> bool:
         """Whether the control ends at R (G99) after a cycle, and not where it began."""
         moves = self.moves
-        if moves.approach is None or row + 1 == len(moves):
+        if row + 1 == len(moves):
             return False
         on = moves.start[row + 1] == moves.approach[row]
         return bool(on[moves.end[row] != moves.approach[row]].all())
@@ -367,7 +367,7 @@ class RetractLevels:
 
     def returns(self, row: int) -> Mask:
         """(n_axes,) axes that are at the level R at the start of the motion after a cycle."""
-        if self.approach is None or self.moves.approach is None:
+        if self.approach is None:
             return np.zeros(len(self.moves.axes), dtype=bool)
         level = self.moves.approach[row]
         return np.asarray((self.moves.start[row + 1] == level) & (self.moves.end[row] != level))

@@ -269,9 +269,8 @@ class _Places:
         bent = PathSamples(move, at, before, after, np.zeros(len(piece)))
         looked = stacked([*samples(written, which, solution.plan.known), bent])
         tip = intent.tip(looked.move, looked.fraction)
-        holes = np.zeros(0, dtype=np.intp)
-        if intent.moves.approach is not None:
-            holes = np.flatnonzero((intent.moves.kind[looked.move] == MotionKind.CYCLE) & (looked.fraction == 1.0))
+        holes = np.flatnonzero((intent.moves.kind[looked.move] == MotionKind.CYCLE) & (looked.fraction == 1.0))
+        if holes.size:
             drilled, none = taken(looked, holes), np.zeros(len(holes))
             above = intent.meant(drilled.move, picked(intent.moves.approach, drilled.move))
             looked, tip = stacked([looked, replace(drilled, fraction=none, weight=none)]), np.concatenate([tip, above])

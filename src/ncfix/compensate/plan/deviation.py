@@ -247,7 +247,7 @@ def _beside(written: WrittenPieces, chosen: Mask) -> PathSamples | None:
     Their weight is 0: they count for the largest errors, not for the rms.
     """
     moves = written.intent.moves
-    if moves.beside is None:
+    if not moves.beside.any():
         return None
     last = written.pieces.last
     found = beside_contours(written.intent, written.segments.rows(last))

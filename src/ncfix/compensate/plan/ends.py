@@ -137,7 +137,7 @@ def _filled(
 def _risen(moves: Moves, approaches: Array | None) -> tuple[Array, Mask]:
     """(n, n_axes) displacement of level R of the cycle before a motion, and whether the motion starts at that level."""
     off, risen = np.zeros(moves.start.shape), np.zeros(moves.start.shape, dtype=bool)
-    if moves.approach is not None and approaches is not None:
+    if approaches is not None:
         at_level = (moves.start[1:] == moves.approach[:-1]) & (moves.start[1:] != moves.end[:-1])
         risen[1:] = at_level & np.isfinite(approaches[:-1])
         off[1:][risen[1:]] = (approaches - moves.approach)[:-1][risen[1:]]
@@ -178,7 +178,7 @@ def corrected_approaches(intent: Intent, wanted: Array, unchanged: Mask) -> Arra
     NaN for motions without such a level, and where it cannot be corrected.
     """
     moves = intent.moves
-    if moves.approach is None:
+    if np.isnan(moves.approach).all():
         return None
     rows = np.flatnonzero(~unchanged & np.isfinite(moves.approach).all(axis=1) & np.isfinite(wanted).all(axis=1))
     result = np.full(moves.approach.shape, np.nan)
@@ -203,7 +203,6 @@ def _steered(intent: Intent, rows: Index, nominal: Array, wanted: Array) -> tupl
 
 def _over_the_hole(moves: Moves, rows: Index, commands: Array, wanted: Array) -> Array:
     """Commands (k, n_axes) moved over the bottom of their hole; only their height in the program's frame is kept."""
-    assert moves.approach is not None
     result = commands.copy()
     for number in sorted(set(moves.frame[rows].tolist())):
         part = np.flatnonzero(moves.frame[rows] == number)
@@ -259,9 +258,7 @@ def on_their_side(intent: Intent, move: Index, q: Array, corrected: Array) -> Ar
 
 def held_axes(intent: Intent, move: Index) -> Mask:
     """(k, n_axes) rotary axes that must stay as programmed in motions `move` (k,)."""
-    held = np.zeros((len(move), len(intent.machine.axes)), dtype=bool)
-    if intent.moves.rotary_as_programmed is not None:
-        held |= intent.moves.rotary_as_programmed[move][:, None] & intent.machine.rotary
+    held: Mask = intent.moves.rotary_as_programmed[move][:, None] & intent.machine.rotary
     if intent.idle is not None:
         held |= intent.idle[move] & intent.machine.rotary
     return held

@@ -221,8 +221,6 @@ class Intent:
         after = np.minimum(holes + 1, len(moves) - 1)
         same = (moves.tcp[after] == moves.tcp[holes]) & (moves.length_under_tcp[after] == moves.length_under_tcp[holes])
         back = np.where((same & (after > holes))[:, None], signs(start[after] - end[holes]), 0)
-        if moves.approach is None:
-            return -back, back
         level = self.joints(holes, moves.approach[holes])
         return np.where(np.isfinite(level), signs(end[holes] - level), -back).astype(np.int8), back
 

@@ -115,8 +115,6 @@ class ContactPath:
 
 def is_offset(moves: Moves) -> Mask:
     """(n,) whether the control offsets the motion by a known tool radius."""
-    if moves.beside is None:
-        return np.zeros(len(moves), dtype=bool)
     return np.nan_to_num(moves.beside) != 0
 
 
@@ -126,8 +124,6 @@ def beside_contours(intent: Intent, real: Segments) -> OffsetPoints | None:
     real  all motions, as corrected
     """
     moves = intent.moves
-    if moves.beside is None or moves.across is None:
-        return None
     rows = np.flatnonzero(is_offset(moves) & (moves.kind != MotionKind.DWELL) & (moves.kind != MotionKind.CYCLE))
     known = np.isfinite(np.hstack([table[rows] for table in (moves.start, moves.end, real.start, real.end)]))
     rows = rows[known.all(axis=1)]

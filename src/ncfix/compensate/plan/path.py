@@ -250,7 +250,7 @@ def _worse_contours(intent: Intent, beside: OffsetPoints | None, unchanged: Mask
     """
     text = "beside this contour the control would take the tool up to {value:.1f} um off, farther than uncorrected"
     none = Finding.of("NCF454", np.zeros(0, dtype=np.intp), text)
-    if beside is None or intent.moves.beside is None:
+    if beside is None:
         return none
     digits = 0.5 * intent.machine.least_increment[0] * beside.rounding
     worse = beside.corner & (beside.after > required.budget.tolerance) & (beside.after > beside.before + digits)
@@ -393,7 +393,5 @@ def _remarks(
 def _unknown_radius(intent: Intent, unchanged: Mask) -> Index:
     """The first corrected motion of each stretch of a contour that the control offsets by an unknown tool radius."""
     beside = intent.moves.beside
-    if beside is None:
-        return np.zeros(0, dtype=np.intp)
     unknown = np.isnan(beside) & ~unchanged
     return np.flatnonzero(unknown & ~np.append(False, unknown[:-1]))
