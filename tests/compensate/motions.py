@@ -16,7 +16,8 @@ from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.path import PathTolerance, Plan, Requirements
 from ncfix.compensate.plan.strategies import Strategy
 from ncfix.compensate.plan.written import Known, WrittenPieces
-from ncfix.control.moves import NEUTRAL, FeedMode, Frame, MotionKind, Moves, Rule, neutral_column
+from ncfix.control.builder import NEUTRAL, neutral_column
+from ncfix.control.moves import FeedMode, Frame, MotionKind, Moves, Rule
 from ncfix.machine import Machine, State
 from ncfix.writer.pieces import Pieces
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ncfix.arrays import Array, Ints, Mask
 from ncfix.control.coordinates import INDEX, N_LETTERS, Rotation, Vector
-from ncfix.control.moves import Arc, CycleCall, Frame, MotionKind, Moves, Pass, Rule, neutral_column
+from ncfix.control.moves import Arc, CycleCall, Frame, MotionKind, Moves, Pass, Rule
 from ncfix.control.turns import Winding, extremes, half_turns
 from ncfix.values import mutable
 
@@ -59,6 +59,32 @@ DTYPES: dict[str, type[np.generic]] = {
     "tcp_length": np.float64,
 }
 """Dtypes of the columns of `Moves` that come from styles; columns not listed are bool."""
+
+
+NEUTRAL: dict[str, tuple[bool, float, type[np.generic]]] = {
+    "rotary_as_programmed": (False, False, np.bool_),
+    "approach": (True, math.nan, np.float64),
+    "placed": (True, True, np.bool_),
+    "fixed_centre": (False, False, np.bool_),
+    "resting": (True, False, np.bool_),
+    "beside": (False, 0.0, np.float64),
+    "across": (False, 2, np.int8),
+    "passing": (False, 0, np.int8),
+    "measured": (True, False, np.bool_),
+    "call": (False, -1, np.int32),
+    "spelled": (True, False, np.bool_),
+    "tcp_length": (False, math.nan, np.float64),
+    "exact_stop": (False, False, np.bool_),
+    "words_alone_turn": (False, False, np.bool_),
+}
+"""Columns of `Moves` that few programs need: whether they have a value for each axis, the value that changes nothing,
+and its type."""
+
+
+def neutral_column(name: str, count: int, n_axes: int) -> NDArray[Any]:
+    """A column of `NEUTRAL` that changes nothing, (count,) or (count, n_axes); read-only, it takes no memory."""
+    by_axis, value, kind = NEUTRAL[name]
+    return np.broadcast_to(np.array(value, dtype=kind), (count, n_axes) if by_axis else (count,))
 
 
 class Circles(NamedTuple):
