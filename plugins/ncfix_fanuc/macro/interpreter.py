@@ -71,7 +71,7 @@ class MacroInterpreter(RS274Interpreter):
         self.cornered = False
 
     def prepared(self) -> MacroFlow:
-        """Give the control its variables, and return the flow at the begin of the program."""
+        """Give the control its variables, and return the flow at the start of the program."""
         control = self.control
         control.parameters.persistent = lambda number: None
         control.parameters.live = system.positions(control) | system.modes(control) | system.offsets(control)
@@ -86,7 +86,7 @@ class MacroInterpreter(RS274Interpreter):
 
     @property
     def to_the_last(self) -> bool:
-        """See `Interpreter`: a subprogram that was searched in files may stand behind the end of the program."""
+        """See `Interpreter`: a subprogram that was sought in files may also stand behind the end of the program."""
         return self.flow.looked
 
     def next_part(self, program: Program, blocks: int) -> None:

@@ -1,12 +1,12 @@
-"""Coded algebra: polynomials in sines, cosines, square roots and dimensions, kept simple after every product.
+"""Coded algebra: polynomials in sines, cosines, square roots and dimensions, simplified after every product.
 
-All that a chain multiplies is a polynomial in these, with rational coefficients. In the ring, sin^2 + cos^2 = 1 and
-sqrt(n)^2 = n are applied at once, so two expressions are equal if, and only if, their polynomials are the same.
+All entries of a chain's matrices are polynomials in these, with rational coefficients. In the ring, sin^2 + cos^2 = 1
+and sqrt(n)^2 = n are applied at once, so two expressions are equal if, and only if, their polynomials are the same.
 Freeman and Ford (2003), section 4.
 
-People are shown the shortest of several ways to write a polynomial: sines or cosines squared away, pairs 1 - cos^2
-merged, factored or not, dimensions with the same function of the angles in brackets. What is too long to be read, or
-has measured numbers in it, is only collected.
+For people, a polynomial is written in the shortest of several ways: squares of sines or of cosines replaced, pairs
+1 - cos^2 merged, factored or not, dimensions with the same function of the angles in brackets. A polynomial that is too
+long to be read, or has measured numbers in it, is only collected into such brackets.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from sympy.polys.rings import PolyRing
 SIMPLE = 10**9
 """A fraction with a larger denominator is a measured number, not an exact constant."""
 FINENESS = 2**90
-"""Measured numbers are computed with to one part in this many."""
+"""Measured numbers are kept as multiples of one part in this many."""
 ROUNDING = 2**46
-"""Factors below one part in this many are the rounding of the measured numbers, doubles of order one."""
+"""With measured numbers, factors below one part in this many are dropped: they come from rounding (to doubles)."""
 
 Powers = tuple[int, ...]
 """Exponents of the generators."""
@@ -34,10 +34,10 @@ Poly = Any
 
 
 class Algebra:
-    """The ring in which some expressions live.
+    """The ring of polynomials to which some expressions belong.
 
-    written   polynomials, with the shortest way to write them: the same ones come again and again
-    factored  polynomials, with their factors
+    written   polynomial -> the shortest way to write it, kept because the same ones occur again and again
+    factored  polynomial -> its factors
     """
 
     def __init__(self, expressions: Iterable[sp.Expr]) -> None:
@@ -74,13 +74,13 @@ class Algebra:
         return self.reduced(self.ring.from_expr(sp.expand(as_fractions(expression))))
 
     def reduced(self, poly: Poly) -> Poly:
-        """The polynomial with the relations applied."""
+        """The polynomial with squares of sines and of roots replaced; factors rounded if there are measured numbers."""
         for index, square in enumerate(self._squares):
             poly = _replaced(poly, index, square)
         return _rounded(poly) if self.measured else poly
 
     def with_sines(self, poly: Poly) -> Poly:
-        """This function with the cosines squared away instead of the sines."""
+        """The same function with squares of cosines replaced, instead of squares of sines."""
         for sine, cosine in self.pairs:
             poly = _replaced(poly, cosine, self._one_minus(sine))
         return poly
@@ -113,12 +113,12 @@ class Algebra:
 
 
 def as_fractions(expression: sp.Expr) -> sp.Expr:
-    """The expression with its decimals as the fractions that they are in binary."""
+    """The expression with its floating-point numbers replaced by the fractions that they are exactly."""
     return expression.xreplace({number: sp.Rational(float(number)) for number in expression.atoms(sp.Float)})
 
 
 def generators(expression: sp.Expr) -> set[sp.Expr]:
-    """What a polynomial form of the expression is a polynomial in."""
+    """The subexpressions, such as symbols, sines and roots, in which the expression is a polynomial."""
     if expression.is_Rational:
         return set()
     if expression.is_Add or expression.is_Mul:
@@ -129,7 +129,7 @@ def generators(expression: sp.Expr) -> set[sp.Expr]:
 
 
 def _replaced(poly: Poly, index: int, square: Poly) -> Poly:
-    """The polynomial with a generator's square replaced wherever it occurs."""
+    """The polynomial with the square of generator `index` replaced by `square` wherever it occurs."""
     while any(powers[index] >= 2 for powers in poly):
         low = {powers: factor for powers, factor in poly.items() if powers[index] < 2}
         high = {raised(powers, index, -2): factor for powers, factor in poly.items() if powers[index] >= 2}
@@ -138,7 +138,7 @@ def _replaced(poly: Poly, index: int, square: Poly) -> Poly:
 
 
 def raised(powers: Powers, index: int, by: int) -> Powers:
-    """The exponents with one of them changed."""
+    """The exponents with that of generator `index` changed by `by`."""
     return (*powers[:index], powers[index] + by, *powers[index + 1 :])
 
 
@@ -151,7 +151,7 @@ def _rounded(poly: Poly) -> Poly:
 
 
 LONG = 40
-"""With more terms than this the search for something shorter takes long and finds little."""
+"""Number of terms above which the search for a shorter way of writing takes long and finds little."""
 
 
 def _plain(algebra: Algebra, poly: Poly) -> bool:
@@ -177,7 +177,7 @@ def _factors(algebra: Algebra, poly: Poly) -> list[sp.Expr]:
 
 
 def _collected(algebra: Algebra, poly: Poly) -> sp.Expr:
-    """Dimensions with the same function of the angles in brackets: (Z - tool_length) sin(C) + ..."""
+    """The polynomial with dimensions that have the same function of the angles in brackets: (Z - L) sin(C) + ..."""
     groups: dict[Poly, dict[Powers, object]] = {}
     for lengths, function in _by_dimension(algebra, poly).items():
         leading = function.LC
@@ -191,7 +191,7 @@ def _collected(algebra: Algebra, poly: Poly) -> sp.Expr:
 
 
 def _by_dimension(algebra: Algebra, poly: Poly) -> dict[Powers, Poly]:
-    """Per product of dimensions, the polynomial in sines, cosines and roots that it comes with."""
+    """Product of dimensions -> the polynomial in sines, cosines and roots that is multiplied by it."""
     start = 2 * len(algebra.angles) + len(algebra.roots)
     found: dict[Powers, dict[Powers, object]] = {}
     for powers, factor in poly.items():
@@ -201,7 +201,7 @@ def _by_dimension(algebra: Algebra, poly: Poly) -> dict[Powers, Poly]:
 
 
 def _with_pairs_merged(algebra: Algebra, poly: Poly) -> Poly:
-    """Pairs a m - a m cos^2 become a m sin^2."""
+    """The polynomial with pairs of terms a m - a m cos^2 replaced by a m sin^2."""
     for sine, cosine in algebra.pairs:
         found = dict(poly)
         for powers in sorted(poly, key=itemgetter(cosine), reverse=True):

@@ -1,10 +1,11 @@
 """A chain: its variables, and the ordered elementary transformations from the workpiece to the tool.
 
-Each variable is Large (a position, a dimension) or Small (an error). Small ones are what the formulas are expanded in;
-an error may be a function of axis positions: `EXX(X)`. A step is a translation, a rotation, or a small motion,
-right-handed: it takes coordinates after it to coordinates before it, and the chain is the product of all steps from the
-workpiece (left) to the tool (right). Its matrix is a series in the Small variables: the sum, over monomials of them, of
-coefficient matrices (4, 4). Freeman and Ford (2003), sections 2 to 4, who take rotations about x and z left-handed.
+Each variable is Large (a position, a dimension) or Small (an error). Formulas are expanded in powers of the Small ones.
+An error may be a function of axis positions: `EXX(X)`. A step is a right-handed translation, rotation, or small motion:
+it takes coordinates after it to coordinates before it, and the chain is the product of all steps from the workpiece
+(left) to the tool (right). The matrix of a step is a series in the Small variables: the sum of their monomials, each
+times a coefficient matrix (4, 4). Freeman and Ford (2003), sections 2 to 4; their rotations about x and z are
+left-handed.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ LETTER = re.compile(r"([A-Za-z])_?(\w+)")
 
 
 class Size(Enum):
-    """Whether the formulas are exact in a variable or expanded in it."""
+    """The size of a variable: formulas are exact in Large ones, and expanded in powers of Small ones."""
 
     LARGE = "large"
     SMALL = "small"
@@ -43,14 +44,14 @@ class Size(Enum):
 class Variable:
     """A variable of a chain.
 
-    name        a name that programming languages accept, too
+    name        a name that is valid in programming languages, too
     size        Large or Small
-    definition  what it is, in words
-    axis        it is the position of an axis: what a command sets
-    rotary      it is an angle, rad; else mm
-    arguments   of an error that changes with the state: the names of what it depends on
-    value       its number if it has one, mm or rad
-    sign        -1 if the angle is defined clockwise, as older work may have it; chains are built with it
+    definition  its meaning in words
+    axis        it is the position of an axis, which a command sets
+    rotary      it is an angle, rad; else a length, mm
+    arguments   names of the variables on which an error depends; empty if it is constant
+    value       its value, mm or rad; None if it has none
+    sign        -1 if the angle is defined clockwise, as in some older work; the formulas of chain files apply it
     """
 
     name: str
@@ -79,7 +80,7 @@ class Variable:
 
     @property
     def symbol(self) -> sp.Expr:
-        """What stands for it in formulas: a symbol, or a function of what it depends on."""
+        """Its symbol in formulas, or a function of the variables on which it depends."""
         if not self.arguments:
             return self.plain
         return sp.Function(self.name, real=True)(*(sp.Symbol(name, real=True) for name in self.arguments))
@@ -99,7 +100,7 @@ class Variable:
 Expr: TypeAlias = sp.Expr
 Vector = tuple[Expr, Expr, Expr]
 Monomial = tuple[int, ...]
-"""Indices of Small variables, in order, repeated if squared; () is one."""
+"""A product of Small variables: their indices in ascending order, repeated for powers; () for the number one."""
 Matrices = dict[Monomial, sp.Matrix]
 
 ZERO: Vector = (sp.Integer(0),) * 3
@@ -110,16 +111,16 @@ UNITS: dict[str, Vector] = {
 
 @frozen
 class Transformation:
-    """What all steps have in common; their fields are vectors and expressions."""
+    """Base class of the steps; their fields are vectors and expressions."""
 
     @property
     def expressions(self) -> tuple[Expr, ...]:
-        """Every expression in it."""
+        """All expressions in the step; vectors give their three components."""
         parts = (getattr(self, each.name) for each in fields(self))
         return tuple(e for part in parts for e in (part if isinstance(part, tuple) else (part,)))
 
     def with_values(self, values: dict[Expr, Expr]) -> Self:
-        """The step with some symbols replaced."""
+        """The step with symbols replaced by expressions: `values`."""
         parts = {each.name: getattr(self, each.name) for each in fields(self)}
         vectors = {n: tuple(e.xreplace(values) for e in part) for n, part in parts.items() if isinstance(part, tuple)}
         return replace(self, **{n: vectors[n] if n in vectors else part.xreplace(values) for n, part in parts.items()})
@@ -167,7 +168,7 @@ Step = Translation | Rotation | Screw
 
 
 def inverse(steps: Sequence[Step]) -> tuple[Step, ...]:
-    """The steps that undo these."""
+    """The steps that undo these: their inverses in reverse order."""
     return tuple(step.inverse for step in reversed(steps))
 
 
@@ -204,7 +205,7 @@ def skew(vector: Vector) -> sp.Matrix:
 
 
 def rodrigues(direction: Vector, angle: Expr) -> sp.Matrix:
-    """The rotation matrix (3, 3) of a unit vector and an angle; sums of angles are written out."""
+    """The rotation matrix (3, 3) of a unit vector and an angle; functions of sums of angles are expanded."""
     cosine, sine = (sp.expand_trig(f(angle)) if f(angle).free_symbols else f(angle) for f in (sp.cos, sp.sin))
     turning, u = skew(direction), sp.Matrix(direction)
     return cosine * sp.eye(3) + sine * turning + (1 - cosine) * (u * u.T)
@@ -217,13 +218,13 @@ def homogeneous(rotation: sp.Matrix, translation: Sequence[Expr], corner: int = 
 
 
 def linear_part(expression: Expr, smalls: Sequence[Expr]) -> tuple[Expr, dict[int, Expr]]:
-    """An expression that is linear in the Small variables: what is free of them, and their factors by index."""
+    """The parts of an expression that is linear in the Small variables: the one without them, and index -> factor."""
     found = {i: expression.diff(small) for i, small in enumerate(smalls) if expression.has(small)}
     return expression.xreplace(dict.fromkeys(smalls, sp.Integer(0))), found
 
 
 def polynomial_part(expression: Expr, smalls: Sequence[Expr], order: int) -> dict[Monomial, Expr]:
-    """The coefficients of an expression by monomials of the Small variables, up to an order."""
+    """Monomial of the Small variables -> its coefficient in the Taylor series of an expression, up to an order."""
     present = [i for i, small in enumerate(smalls) if expression.has(small)]
     zero = dict.fromkeys(smalls, sp.Integer(0))
     found = {}
@@ -236,10 +237,10 @@ def polynomial_part(expression: Expr, smalls: Sequence[Expr], order: int) -> dic
 
 @frozen
 class Chain:
-    """What a derivation starts from.
+    """A chain: the input of a derivation.
 
-    name       for people
-    variables  all that occur in the steps, Large and Small
+    name       its name, for people
+    variables  all variables of the steps, Large and Small
     steps      workpiece_from_tool is their product, left to right; the last frame has its origin at the tool tip
     tool_axis  the unit vector from the tip towards the spindle in the last frame
     """
@@ -251,7 +252,7 @@ class Chain:
 
     @property
     def smalls(self) -> tuple[Variable, ...]:
-        """The errors, in order."""
+        """The errors, in the order of `variables`."""
         return tuple(variable for variable in self.variables if variable.small)
 
     @property
@@ -261,7 +262,7 @@ class Chain:
 
     @property
     def dimensions(self) -> tuple[Variable, ...]:
-        """Large variables that are no axis positions."""
+        """The Large variables that are not axis positions."""
         return tuple(variable for variable in self.variables if not variable.small and not variable.axis)
 
     def variable(self, name: str) -> Variable:

@@ -1,7 +1,7 @@
 """Chain files: any serial chain as a list of elementary transformations, in TOML. docs/derive.md describes them.
 
-The transformations are text, `T(0, -e, -e/tan(Yp))` or `Rz(Cp)`, from the workpiece to the tool. They are read as
-arithmetic and nothing else: no name but those of the variables, pi and sin, cos, tan, sqrt.
+The transformations are texts like `T(0, -e, -e/tan(Yp))` or `Rz(Cp)`, from the workpiece to the tool. They are read as
+arithmetic and are never executed: the only names are those of the variables, pi, sin, cos, tan and sqrt.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ OPERATORS: Mapping[type, Callable[..., Expr]] = {
 FUNCTIONS: Mapping[str, Callable[[Expr], Expr]] = {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "sqrt": sp.sqrt}
 STEPS = ("T", "Rx", "Ry", "Rz")
 UNIT_TO = 1e-9
-"""How far from one the square of a unit vector's length may be: nine digits in the file."""
+"""Largest deviation from 1 of the squared length of a unit vector, which has about nine digits in the file."""
 
 
 def load_chain(path: str | Path) -> Chain:
@@ -45,7 +45,7 @@ def load_chain(path: str | Path) -> Chain:
 
 
 def loads_chain(text: str, path: str = "<chain>") -> Chain:
-    """The chain that a text describes; raises as `load_chain`."""
+    """The chain that a text describes; raises the same errors as `load_chain`."""
     values = parsed(text, path, "NCF301")
     report = Report(path, text, key_lines(text))
     chain = _chain(TomlTable(values, (), report))
@@ -120,7 +120,7 @@ def _check_steps(root: TomlTable, variables: tuple[Variable, ...], steps: list[S
 
 
 class _FormulaError(Exception):
-    """What is wrong with a formula."""
+    """Raised with the fault of a formula."""
 
     def __init__(self, text: str, hint: str = "") -> None:
         super().__init__(text)
@@ -128,13 +128,13 @@ class _FormulaError(Exception):
 
 
 class _Formulas:
-    """Reads formulas in some names."""
+    """Reads formulas in which the given names may occur."""
 
     def __init__(self, names: Mapping[str, Expr]) -> None:
         self._names = {**names, "pi": sp.pi}
 
     def step(self, text: str, senses: Mapping[str, int]) -> Step:
-        """An elementary transformation."""
+        """The elementary transformation that a text describes; `senses`: axis -> -1 for left-handed rotations."""
         try:
             call = ast.parse(text.strip(), mode="eval").body
         except (SyntaxError, ValueError, RecursionError) as error:

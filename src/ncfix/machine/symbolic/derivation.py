@@ -1,12 +1,12 @@
-"""The derivation: from a machine or a chain to nominal formulas and error formulas of first or higher order.
+"""The derivation: nominal formulas, and error formulas of first or higher order, of a machine or a chain.
 
 The error is actual minus nominal in the workpiece frame: dx dy dz of the tip, mm, and the rotation vector rx ry rz of
-R_actual R_nominal^T, rad, as `Machine.error` has it.
+R_actual R_nominal^T, rad, as in `Machine.error`.
 
 Matrices are power series in the Small variables, {monomial: coefficient matrix}. Products of more Small variables than
-the order are dropped as they arise, as Freeman and Ford (2003) do; sines and cosines of small angles are expanded to
-the order asked for. `linear_trig` takes their simpler substitution instead, sin t = t and cos t = 1, which leaves
-second-order terms out.
+the order are dropped as they arise, as in Freeman and Ford (2003); sines and cosines of small angles are expanded to
+the order. With `linear_trig`, the simpler substitution of that paper is used instead, sin t = t and cos t = 1, which
+omits second-order terms.
 """
 
 from __future__ import annotations
@@ -44,14 +44,19 @@ Series = dict[Monomial, DomainMatrix]
 
 @frozen
 class Expansion:
-    """How far, and in what."""
+    """The expansion of steps into power series.
+
+    smalls       symbols of the Small variables, by the index that monomials use
+    order        highest order of the terms
+    linear_trig  use sin t = t and cos t = 1 for small angles
+    """
 
     smalls: tuple[sp.Expr, ...]
     order: int
     linear_trig: bool = False
 
     def step(self, step: Step) -> list[Matrices]:
-        """A step as the product of power series whose coefficients are sympy matrices."""
+        """The power series whose product is the step; coefficients are sympy matrices (4, 4)."""
         if isinstance(step, Translation):
             parts = [polynomial_part(component, self.smalls, self.order) for component in step.vector]
             found = {}
@@ -73,7 +78,7 @@ class Expansion:
         return [nominal, *self._exponential({(i,): factor * turning for i, factor in factors.items()})]
 
     def _exponential(self, twist: Matrices) -> list[Matrices]:
-        """1 + t + t^2/2 + ... of a twist that is linear in the Small variables."""
+        """The series 1 + t + t^2/2 + ... of a twist t that is linear in the Small variables; none for a zero twist."""
         if not twist:
             return []
         total: Matrices = {(): sp.eye(4)}
@@ -89,7 +94,7 @@ class Expansion:
 
 
 def multiply(algebra: Algebra, a: Series, b: Series, order: int) -> Series:
-    """The product of two series, truncated."""
+    """The product of two series, without terms above the order."""
     found: Series = {}
     for (p, left), (q, right) in product(a.items(), b.items()):
         if len(p) + len(q) <= order:
@@ -99,7 +104,7 @@ def multiply(algebra: Algebra, a: Series, b: Series, order: int) -> Series:
 
 
 def compose(algebra: Algebra, factors: Sequence[Series], order: int) -> Series:
-    """The product of many, neighbours first, so that most of the work is done with few variables."""
+    """The product of many series: of neighbours first, so that most products involve few variables."""
     level = list(factors)
     while len(level) > 1:
         pairs = zip(level[::2], level[1::2], strict=False)
@@ -108,7 +113,7 @@ def compose(algebra: Algebra, factors: Sequence[Series], order: int) -> Series:
 
 
 def logarithm(algebra: Algebra, series: Series, order: int) -> Series:
-    """x - x^2/2 + x^3/3 - ... of a series 1 + x whose x has no constant part."""
+    """The series x - x^2/2 + x^3/3 - ..., the logarithm of 1 + x; x has no constant part."""
     x = {key: matrix for key, matrix in series.items() if key}
     total: Series = {}
     power: Series | None = None
@@ -129,10 +134,10 @@ Terms = dict[Monomial, sp.Expr]
 
 @frozen
 class Derivation:
-    """Formulas of a chain.
+    """The formulas of a chain.
 
     nominal  x y z of the tool tip, mm, and i j k, the unit vector from the tip towards the spindle; workpiece frame
-    terms    per component dx ... rz: the coefficient of every monomial of the errors (indices into `chain.smalls`)
+    terms    component dx ... rz -> monomial of the errors (indices into `chain.smalls`) -> coefficient
     order    highest number of errors in a product
     """
 
@@ -143,20 +148,20 @@ class Derivation:
 
     @property
     def error(self) -> dict[str, sp.Expr]:
-        """The error formulas: component -> expression, collected by error."""
+        """The error formulas: component -> sum of its products."""
         return {name: sp.Add(*self.products(name).values()) for name in COMPONENTS}
 
     def products(self, component: str) -> dict[Monomial, sp.Expr]:
-        """The summands of a component: each a coefficient times its errors."""
+        """Monomial -> summand of a component: its coefficient times its errors."""
         return {key: coefficient * self.monomial(key) for key, coefficient in self.terms[component].items()}
 
     def monomial(self, key: Monomial) -> sp.Expr:
-        """The product of errors that a key stands for."""
+        """The product of errors that a monomial means."""
         return sp.Mul(*(self.chain.smalls[i].symbol for i in key))
 
     @property
     def without_effect(self) -> tuple[str, ...]:
-        """Errors that appear in no formula."""
+        """Names of the errors that occur in no formula."""
         used = {i for terms in self.terms.values() for key in terms for i in key}
         return tuple(variable.name for i, variable in enumerate(self.chain.smalls) if i not in used)
 
@@ -170,7 +175,7 @@ def _nominal(algebra: Algebra, pose: DomainMatrix, chain: Chain) -> dict[str, sp
 
 
 def _terms(algebra: Algebra, pose: Series, order: int) -> dict[str, Terms]:
-    """Shift of the tip, and the rotation vector as the logarithm of R_actual R_nominal^T."""
+    """The terms of each component: the tip's shift, and the rotation vector, the logarithm of R_actual R_nominal^T."""
     rotations = {key: matrix.extract([0, 1, 2], [0, 1, 2]) for key, matrix in pose.items()}
     turned = multiply(algebra, rotations, {(): rotations[()].transpose()}, order)
     vector = logarithm(algebra, turned, order)
@@ -194,13 +199,13 @@ def derive(
 ) -> Derivation:
     """Nominal formulas, and error formulas to an order, of a machine or of a chain of elementary transformations.
 
-    order        1, 2, ...: products of more errors than this are left out
-    include      which errors: names or patterns such as "E?C"; for a machine also the groups "motions", "locations",
-                 "spindle" and "machine" (what its file has). None: all motions and locations; all errors of a chain
-    lettered     of a machine: fixed angles of axes become variables instead of exact constants
-    linear_trig  sin t = t and cos t = 1 for errors, as Freeman and Ford have it: wrong from second order on
+    order        highest number of errors in a product: 1, 2, ...
+    include      names of errors, or patterns such as "E?C"; for a machine also the groups "motions", "locations",
+                 "spindle" and "machine" (those in its file). None: of a machine the first three groups, of a chain all
+    lettered     for a machine: fixed angles of axes become variables instead of exact constants
+    linear_trig  sin t = t and cos t = 1 for errors, as in Freeman and Ford: wrong from second order on
 
-    Raises `UsageError` NCF392 (order) and NCF393 (an error that is not there).
+    Raises `UsageError` NCF392 for a wrong order, and NCF393 for an error that does not exist.
     """
     if isinstance(source, Machine):
         chain = from_machine(source, DEFAULT if include is None else include, lettered)

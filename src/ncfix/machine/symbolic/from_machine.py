@@ -1,10 +1,11 @@
-"""A machine as a chain of elementary transformations, with the errors that are asked for.
+"""A machine as a chain of elementary transformations, with chosen errors.
 
-Joint by joint it is what the fast engine composes, B = Lc L E M(q + offset) inverse(L): M nominal motion, E error
-motion about its reference point, L location errors of the axis line, Lc location errors that carry the body.
+Each joint is composed as in the numerical engine, B = Lc L E M(q + offset) inverse(L): M is the nominal motion, E the
+error motion about its reference point, L the location errors of the axis line, Lc location errors that carry the body.
 
-Numbers of a machine file become exact constants: 0.7071067811865476 is sqrt(2)/2, a head's 50 degrees stay 50 degrees.
-What is not recognised, or what the reader wants to see as a letter, becomes a Large variable with a value.
+Numbers of a machine file become exact constants where they are recognised: 0.7071067811865476 is sqrt(2)/2, and 50
+degrees of a head are exact. Other numbers, and those that the user wants as letters, become Large variables with a
+value.
 """
 
 from __future__ import annotations
@@ -46,15 +47,15 @@ from ncfix.machine.symbolic.chain import (
 from ncfix.values import frozen
 
 CLOSE = 1e-14
-"""How near an exact constant a number must be: well below what the fast engine resolves."""
+"""Largest difference of a number from the exact constant that it is taken for."""
 STEPS_PER_DEGREE = 60
-"""Angles of whole minutes of arc are exact."""
+"""Steps of angles that are taken as exact: whole minutes of arc."""
 LARGEST_DENOMINATOR = 100
-"""Numbers whose squares are fractions with no larger denominator are exact."""
+"""A number is taken as exact if its square is a fraction with a denominator up to this."""
 
 
 class Constants:
-    """Turns numbers into exact constants or variables; keeps the variables."""
+    """Converts numbers to exact constants or to variables, and keeps these: name -> variable."""
 
     def __init__(self, lettered: bool = False) -> None:
         """`lettered`: fixed angles become variables even where they are recognised."""
@@ -63,7 +64,7 @@ class Constants:
         self._shared: dict[tuple[str, float], str] = {}
 
     def point(self, values: Sequence[float], suffix: str, definition: str) -> Vector:
-        """A point, mm: zero is zero; every other coordinate a variable, the same one where points share it."""
+        """A point, mm: each coordinate is 0 or a variable; points with an equal coordinate share its variable."""
         x, y, z = (self._length(value, c, suffix, definition) for c, value in zip("xyz", values, strict=True))
         return x, y, z
 
@@ -79,7 +80,7 @@ class Constants:
         return self._variable(name, value, f"{coordinate} of {definition}")
 
     def direction(self, values: Sequence[float], suffix: str, definition: str) -> Vector:
-        """A unit vector: along a coordinate axis, in a coordinate plane, or skew."""
+        """A unit vector: exact along an axis, by one angle in a coordinate plane, else by roots or binary fractions."""
         inside = [k for k, value in enumerate(values) if abs(value) > CLOSE]
         if len(inside) == 1:
             return tuple(sp.Integer(round(value)) for value in values)
@@ -105,7 +106,7 @@ class Constants:
 
 
 def _degrees(angle: float) -> Expr | None:
-    """The angle as a rational part of pi if it is a whole number of minutes of arc."""
+    """The angle as a fraction of pi if it is a whole number of minutes of arc; else None."""
     minutes = round(angle * 180 / pi * STEPS_PER_DEGREE)
     if abs(minutes / STEPS_PER_DEGREE * pi / 180 - angle) > CLOSE:
         return None
@@ -113,7 +114,7 @@ def _degrees(angle: float) -> Expr | None:
 
 
 def _root(value: float) -> Expr | None:
-    """The number as the square root of a simple fraction."""
+    """The number as plus or minus the square root of a simple fraction; None if that is not exact."""
     square = sp.Rational(value * value).limit_denominator(LARGEST_DENOMINATOR)
     root = sp.sqrt(square) * (1 if value > 0 else -1)
     return root if abs(float(root) - value) < CLOSE else None
@@ -121,15 +122,17 @@ def _root(value: float) -> Expr | None:
 
 DEFAULT = ("motions", "locations", "spindle")
 GROUPS = ("motions", "locations", "spindle", "machine")
-"""Error motions of the axes; location errors of the axes; location errors of the spindle; what the machine file has."""
+"""Error motions of the axes; location errors of the axes; location errors of the spindle; all of the machine file."""
 
 
 @frozen
 class ErrorSymbol:
-    """An error component of a joint as a variable, with what the machine file says of it.
+    """An error component of a joint as a variable, with its properties by the machine file.
 
-    reference  where its rotation causes no translation, base frame; None: the joint's own reference point
-    carried    a location error that carries the body
+    component  0 to 2 a translation, 3 to 5 a rotation
+    location   it is a location error, else an error motion
+    reference  point at which its rotation causes no translation, mm, base frame; None: the joint's reference point
+    carried    it is a location error that carries the body
     """
 
     variable: Variable
@@ -141,7 +144,7 @@ class ErrorSymbol:
 
 
 def chosen(machine: Machine, include: str | Iterable[str] = DEFAULT) -> list[ErrorSymbol]:
-    """The errors that `include` names: groups, names, patterns such as "E?C"; raises `UsageError` NCF393."""
+    """The errors that `include` chooses by groups, names, or patterns such as "E?C"; raises `UsageError` NCF393."""
     everything = component_names((*machine.axis_names, SPINDLE))
     wanted: set[str] = set()
     for item in [include] if isinstance(include, str) else include:
@@ -187,7 +190,7 @@ def _symbol(machine: Machine, name: str) -> ErrorSymbol:
 
 
 Carry = Callable[[Numbers, Vector], Vector]
-"""Takes a reference point (numbers and symbols, all axes at zero) to where the joint has carried it."""
+"""Gives the place to which the joint has carried a reference point, which is given as numbers and as symbols."""
 
 Vectors = Sequence[Vector]
 BASE: Vectors = tuple(UNITS.values())
@@ -227,7 +230,7 @@ def _position(axis: Axis) -> Variable:
 
 
 class _References:
-    """Reference points of a joint as vectors of symbols, carried along by the joint: its own, and those of effects."""
+    """Reference points of a joint and of its errors as vectors of symbols, carried along by the joint if it moves."""
 
     def __init__(self, numbers: Numbers, symbols: Vector, constants: Constants, carry: Carry | None = None) -> None:
         self._default = numbers
@@ -236,7 +239,7 @@ class _References:
         self.center = self._carried(numbers, symbols)
 
     def of(self, error: ErrorSymbol) -> Vector:
-        """Where this error's rotation causes no translation."""
+        """The point at which this error's rotation causes no translation."""
         if error.reference is None or tuple(error.reference) == tuple(self._default):
             return self.center
         name = f"_{error.variable.name}"
@@ -250,7 +253,11 @@ class _References:
 def _small_motion(
     errors: Iterable[ErrorSymbol], shifts: Vectors, turns: Vectors, references: _References
 ) -> list[Step]:
-    """Translation along `shifts` after rotation about `turns`: T(center) T(t) exp(m, w) T(-center)."""
+    """The steps of a rotation about vectors `turns`, then a translation along `shifts`.
+
+    They are T(center) T(t) exp(m, w) T(-center): t is the translation, w the rotation vector, and m the moments of
+    rotations whose reference point is not the centre.
+    """
     shift, turn, moment = ZERO, ZERO, ZERO
     for error in errors:
         if error.component < 3:
@@ -265,7 +272,7 @@ def _small_motion(
 
 
 class _AxisSteps:
-    """The steps of one axis."""
+    """Builds the steps of one axis."""
 
     def __init__(self, axis: Axis, constants: Constants) -> None:
         self.axis = axis
@@ -280,7 +287,7 @@ class _AxisSteps:
         self.fixed = _References(axis.reference, self.point, constants)
 
     def steps(self, errors: Sequence[ErrorSymbol]) -> tuple[Step, ...]:
-        """Lc L E M(q + offset) inverse(L)."""
+        """The steps Lc L E M(q + offset) inverse(L)."""
         turned: Vectors = self.triad
         if self.axis.moving_frame and self.axis.rotary:
             rotation = rodrigues(self.direction, self.position)
@@ -292,7 +299,7 @@ class _AxisSteps:
         return (*carried, *line, *motion, *self._nominal(errors), *inverse(line))
 
     def _nominal(self, errors: Sequence[ErrorSymbol]) -> list[Step]:
-        """M(q + offset): the zero offset is the part of the location errors that is along or about the axis itself."""
+        """M(q + offset); the offset is the part of the location errors along (rotary: about) the axis itself."""
         position = self.position
         for error in errors:
             if error.location and not error.carried and (error.component >= 3) == self.axis.rotary:
@@ -303,7 +310,7 @@ class _AxisSteps:
         return [Translation(self.point), Rotation(self.direction, position), Translation(negated(self.point))]
 
     def _line(self, errors: Sequence[ErrorSymbol]) -> list[Step]:
-        """L: the rest of the location errors."""
+        """L: the location errors, without the part in the zero offset and those that carry the body."""
         along = [scaled(-dot(row, self.direction), self.direction) for row in self.triad]
         across = tuple(added(row, part) for row, part in zip(self.triad, along, strict=True))
         shifts, turns = (self.triad, across) if self.axis.rotary else (across, self.triad)

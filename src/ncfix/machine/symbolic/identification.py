@@ -1,12 +1,13 @@
-"""What can be identified: which errors only show up together, and a measurement protocol that isolates them one by one.
+"""Identification: the errors that only act together, and a measurement protocol that isolates errors one by one.
 
-Coefficients of the errors are polynomials in functions of what is varied (axis positions, perhaps tool length): two
-errors can be told apart if, and only if, their coefficients are linearly independent as such. This is exact: no grid
-of poses is chosen. Dependence is found in numbers at a generic point, and solved in symbols. It is what is missing in
-Freeman and Ford (2003), whose Tests 6 to 8 ask for two parameters where the formulas only have one.
+The coefficients of the errors are polynomials in functions of the varied quantities (axis positions, perhaps tool
+length). Errors can be separated if, and only if, their coefficients are linearly independent polynomials. This is
+exact: no grid of poses is chosen. Dependence is found numerically, with the fixed quantities at a generic point, and
+solved symbolically. Freeman and Ford (2003) do not examine it: their Tests 6 to 8 ask for two parameters where the
+formulas have only one.
 
-The protocol is their section 5, Table 4: sums and differences of readings at indexed poses. A reading is the position
-of the tool tip, nominal part included.
+The protocol is that of their section 5, Table 4: sums and differences of readings at indexed poses. A reading is the
+position of the tool tip, nominal part included.
 """
 
 from __future__ import annotations
@@ -24,14 +25,14 @@ from ncfix.machine.symbolic.derivation import POSITION, Derivation
 from ncfix.values import frozen
 
 NEGLIGIBLE = 1e-9
-"""Relative size below which a residual is rounding: entries are of order one and exact to 1e-15."""
+"""Relative size below which a residual is rounding; entries are of order 1 with errors of about 1e-15."""
 
 
 class PolynomialColumns:
-    """Columns of polynomials, one per unknown; a column is {row: polynomial}, what it has not is zero."""
+    """A matrix of polynomials with a column for each unknown: {row: polynomial}; entries that are absent are zero."""
 
     def __init__(self, algebra: Algebra, columns: Sequence[Mapping[Hashable, Poly]]) -> None:
-        """All rows that occur are taken."""
+        """The rows are all those that occur in any column."""
         self._algebra = algebra
         self._columns = columns
         self._rows = list(dict.fromkeys(row for column in columns for row in column))
@@ -42,16 +43,16 @@ class PolynomialColumns:
 
     @property
     def invisible(self) -> list[int]:
-        """The columns that are zero."""
+        """Indices of the columns that are zero."""
         return [index for index, column in enumerate(self.numbers.T) if not column.any()]
 
     @property
     def independent_rows(self) -> list[Hashable]:
-        """As many rows as the rank, from the first on."""
+        """The rows that do not depend on rows before them; as many as the rank."""
         return [self._rows[index] for index in independent_columns(self.numbers.T)]
 
     def combinations(self, unknowns: Sequence[sp.Expr]) -> dict[int, sp.Expr]:
-        """By pivot: the unknown itself plus what the dependent columns' unknowns add to it."""
+        """Pivot -> its unknown plus the multiples of unknowns of dependent columns that act in the same way."""
         found = {pivot: unknowns[pivot] for pivot in self.pivots}
         for index in set(range(len(unknowns))) - set(self.pivots):
             for pivot, factor in self._factors(index).items():
@@ -59,7 +60,7 @@ class PolynomialColumns:
         return found
 
     def _factors(self, index: int) -> dict[int, sp.Expr]:
-        """The column as a combination of pivot columns, by Cramer's rule."""
+        """Pivot -> its factor in the combination of pivot columns that equals column `index`, by Cramer's rule."""
         algebra = self._algebra
         factors = np.linalg.lstsq(self.numbers[:, self.pivots], self.numbers[:, index], rcond=None)[0]
         used = [pivot for pivot, factor in zip(self.pivots, factors, strict=True) if abs(factor) > NEGLIGIBLE]
@@ -77,7 +78,7 @@ class PolynomialColumns:
 
 
 def _determinant(algebra: Algebra, square: list[list[Poly]]) -> Poly:
-    """By minors of the last rows, each worked out once."""
+    """The determinant, by minors of the last rows, each computed once."""
 
     @cache
     def minor(columns: tuple[int, ...]) -> Poly:
@@ -94,7 +95,7 @@ def _determinant(algebra: Algebra, square: list[list[Poly]]) -> Poly:
 
 
 def _at_generic_point(algebra: Algebra) -> Callable[[Poly | None], float]:
-    """The values of polynomials where the ring's generators are numbers as no coincidence would give them."""
+    """A function that evaluates polynomials (None is zero) with all symbols at fixed random numbers."""
     symbols = sorted(set().union(*(g.free_symbols for g in algebra.ring.symbols)), key=sp.default_sort_key)
     numbers = np.random.default_rng(2003).uniform(0.4, 1.4, len(symbols))
     point = {symbol: sp.Float(number) for symbol, number in zip(symbols, numbers, strict=True)}
@@ -108,7 +109,7 @@ def _at_generic_point(algebra: Algebra) -> Callable[[Poly | None], float]:
 
 
 def independent_columns(matrix: Array) -> list[int]:
-    """The columns, from the left, that are not combinations of those before them."""
+    """Indices of the columns that are not combinations of those to their left."""
     found: list[int] = []
     basis = np.zeros((matrix.shape[0], 0))
     for index, column in enumerate(matrix.T):
@@ -126,11 +127,11 @@ TIP = ("dx", "dy", "dz")
 
 @frozen
 class Identifiable:
-    """What measurements of all poses can say.
+    """What measurements at all poses can identify.
 
-    unknowns      the errors asked for
-    combinations  as many as the rank: each an error, or a sum of errors that act as one
-    invisible     errors that no pose shows
+    unknowns      names of the errors examined
+    combinations  as many as the rank: each an error, or a weighted sum of errors that act as one
+    invisible     names of the errors that have no effect at any pose
     """
 
     unknowns: tuple[str, ...]
@@ -139,7 +140,7 @@ class Identifiable:
 
     @property
     def rank(self) -> int:
-        """How many independent parameters there are."""
+        """The number of independent parameters."""
         return len(self.combinations)
 
     @property
@@ -148,7 +149,7 @@ class Identifiable:
         return tuple(combination for combination in self.combinations if combination.is_Add)
 
     def to_text(self) -> str:
-        """In words."""
+        """The result as text."""
         lines = [f"rank {self.rank} of {len(self.unknowns)}"]
         lines += [f"only together: {combination}" for combination in self.inseparable]
         lines += [f"no pose shows: {' '.join(self.invisible)}"] if self.invisible else []
@@ -158,11 +159,11 @@ class Identifiable:
 def identifiable(
     derivation: Derivation, varied: Sequence[str] | None = None, components: Sequence[str] = TIP, absolute: bool = True
 ) -> Identifiable:
-    """What can be identified when `varied` is varied; errors that depend on positions are left out.
+    """What can be identified while `varied` is varied; errors that depend on positions are left out.
 
-    varied      names of axes, and of dimensions that are varied too (a second tool length); None: all axes
-    components  what is measured: dx dy dz, rx ry rz
-    absolute    False: only changes are seen, since the origin of the measurement is unknown
+    varied      names of axes, and of dimensions that are also varied (a second tool length); None: all axes
+    components  the measured components, of dx dy dz, rx ry rz
+    absolute    False: the origin of the measurement is unknown, so only changes are measured
     """
     names = set(varied) if varied is not None else {axis.name for axis in derivation.chain.axes}
     wanted = {i: variable for i, variable in enumerate(derivation.chain.smalls) if not variable.arguments}
@@ -177,7 +178,7 @@ def identifiable(
 
 
 def _split(algebra: Algebra, column: Mapping[str, sp.Expr], moving: Mask, absolute: bool) -> dict[Hashable, Poly]:
-    """Polynomials in what is fixed, by component and monomial of what is varied."""
+    """(component, monomial of the varied quantities) -> polynomial in the fixed ones; `moving`: varied generators."""
     found: dict[Hashable, Poly] = {}
     for component, expression in column.items():
         poly = algebra.poly(expression)
@@ -200,8 +201,8 @@ class Equation:
     """A difference or sum of one coordinate at two poses, as a linear equation in the unknown errors.
 
     sign          -1: first minus second; 1: first plus second
-    coefficients  per unknown that occurs
-    constant      what the nominal machine gives
+    coefficients  unknown -> its coefficient, for all that occur
+    constant      the value for a machine without errors
     """
 
     algebra: Algebra
@@ -214,24 +215,24 @@ class Equation:
 
     @property
     def unknowns(self) -> frozenset[sp.Expr]:
-        """The errors that occur."""
+        """The unknown errors in the equation."""
         return frozenset(self.coefficients)
 
     @cached_property
     def expression(self) -> sp.Expr:
-        """The right-hand side."""
+        """The right-hand side: what the measurement equals."""
         parts = [self.algebra.expression(poly) * symbol for symbol, poly in self.coefficients.items()]
         return sp.Add(*parts, self.algebra.expression(self.constant))
 
     @property
     def measurement(self) -> str:
-        """What is measured, in degrees: `X(90, 0) - X(270, 180)`."""
+        """The left-hand side: the readings, with their poses in degrees, like `X(90, 0) - X(270, 180)`."""
         first, second = (f"{self.coordinate.upper()}({', '.join(map(str, p))})" for p in (self.first, self.second))
         return f"{first} {'-' if self.sign < 0 else '+'} {second}"
 
     @property
     def terms(self) -> int:
-        """How long it is."""
+        """The number of terms on the right-hand side."""
         return sum(len(poly) for poly in self.coefficients.values()) + len(self.constant)
 
 
@@ -243,10 +244,10 @@ def equations(
 ) -> tuple[Equation, ...]:
     """All differences (sign -1) and sums (1) of every coordinate over every pair of poses.
 
-    angles  degrees that each rotary axis takes
-    zero    names of errors assumed to be zero
+    angles  positions of each rotary axis, degrees
+    zero    names of errors that are assumed to be zero
 
-    An error that depends on a rotary axis is another unknown at each of its positions.
+    An error that depends on a rotary axis is a separate unknown at each position of the axis.
     """
     axes = [variable.symbol for variable in derivation.chain.axes if variable.rotary]
     poses = list(product(angles, repeat=len(axes)))
@@ -263,7 +264,7 @@ def equations(
 
 
 def _reading(derivation: Derivation, pose: Mapping[sp.Expr, int], zero: set[str]) -> list[dict[sp.Expr, sp.Expr]]:
-    """Per coordinate: the nominal value under 1, and the coefficient of each error."""
+    """For each coordinate, error -> its coefficient; under the key 1, the nominal value."""
     values = {axis: sp.pi * sp.Rational(degrees, 180) for axis, degrees in pose.items()}
     wanted = {i for i, variable in enumerate(derivation.chain.smalls) if variable.name not in zero}
     found = []
@@ -280,16 +281,16 @@ Choose = Callable[[Sequence[Equation]], Equation]
 
 
 def shortest(candidates: Sequence[Equation]) -> Equation:
-    """Of equations with equally many unknowns the one with the fewest terms; the first of those."""
+    """The equation with the fewest terms; the first if several have equally few."""
     return min(candidates, key=lambda equation: equation.terms)
 
 
 @frozen
 class Identification:
-    """A step of the protocol: measure, and find an error from those found before.
+    """A step of the protocol: it finds an error by measurements, and by the errors found before.
 
-    identifies  the error; or the errors that only show up together, as one expression
-    equations   one, or several that are solved together
+    identifies  the error; or a combination of errors that only act together
+    equations   one equation, or several that are solved together
     """
 
     identifies: sp.Expr
@@ -299,7 +300,7 @@ class Identification:
 def simplest(
     system: Iterable[Equation], wanted: sp.Expr | None = None, known: Iterable[sp.Expr] = ()
 ) -> list[Equation]:
-    """The equations with the fewest unknowns that are not known yet; `wanted`: those that have this one."""
+    """The equations with the fewest unknowns that are not known yet; if `wanted` is given, only among those with it."""
     done = frozenset(known)
     open_ones = [(equation.unknowns - done, equation) for equation in system]
     useful = [(rest, equation) for rest, equation in open_ones if rest and (wanted is None or wanted in rest)]
@@ -308,10 +309,10 @@ def simplest(
 
 
 def protocol(system: Sequence[Equation], choose: Choose = shortest) -> tuple[Identification, ...]:
-    """Identify one error after the other, each from the simplest equation that is left.
+    """The steps that identify one error after the other, each from the simplest equation that is left.
 
-    Errors that all these equations only have together are identified as one combination. Where no equation has a
-    single unknown, several are solved together.
+    Errors that occur in the equations only together are identified as one combination. If no equation has a single
+    unknown, several are solved together.
     """
     unknowns = sorted(frozenset[sp.Expr]().union(*(equation.unknowns for equation in system)), key=sp.default_sort_key)
     if not unknowns:
@@ -328,7 +329,7 @@ def protocol(system: Sequence[Equation], choose: Choose = shortest) -> tuple[Ide
 
 
 def _columns(system: Sequence[Equation], unknowns: Sequence[sp.Expr]) -> PolynomialColumns:
-    """A column per unknown, a row per equation."""
+    """The coefficients, with a column for each unknown and a row for each equation."""
     columns: list[dict[Hashable, Poly]] = [{} for _ in unknowns]
     for equation in system:
         for column, unknown in zip(columns, unknowns, strict=True):
@@ -340,7 +341,7 @@ def _columns(system: Sequence[Equation], unknowns: Sequence[sp.Expr]) -> Polynom
 def _solvable(
     system: Sequence[Equation], first: Equation, known: set[sp.Expr]
 ) -> tuple[list[sp.Expr], tuple[Equation, ...]]:
-    """The fewest unknowns, with those of the first equation, for which there are as many independent equations."""
+    """A small set of unknowns, with those of the first equation, and as many independent equations, which find them."""
     unknowns = sorted(first.unknowns - known, key=sp.default_sort_key)
     if len(unknowns) == 1:
         return unknowns, (first,)
@@ -355,7 +356,7 @@ def _solvable(
 
 
 def report(tests: Iterable[Identification]) -> str:
-    """The protocol as text: what each test identifies, and its equations."""
+    """The protocol as text: for each step what it identifies, and its equations."""
     lines = []
     for number, test in enumerate(tests, 1):
         lines.append(f"{number:3}. {test.identifies}")
@@ -364,7 +365,7 @@ def report(tests: Iterable[Identification]) -> str:
 
 
 def measuring(derivation: Derivation, vary: Iterable[str] = ()) -> str:
-    """Rank and inseparable combinations, without and with lengths varied (`vary`), then a protocol of differences."""
+    """The rank and inseparable combinations, also with the lengths `vary` varied, then a protocol of differences."""
     chain = derivation.chain
     axes = [axis.name for axis in chain.axes]
     parts = [

@@ -1,8 +1,9 @@
-"""The nominal inverse: axis positions from tip position and tool direction, where a closed form is reachable.
+"""The nominal inverse: axis positions by the tip position and the tool direction, where there is a closed form.
 
-The tool direction gives the rotary axes: with two of them, u_a . d = u_a . R(u_b, b) t gives b and the rotation about
-u_a from R(u_b, b) t to d gives a (subproblems of Paden and Kahan; Lynch and Park, Modern Robotics (2017), 6.1). The
-linear axes then follow from a linear system. Every axis is turned or shifted by its own number alone.
+The tool direction d gives the rotary axes. With two of them, a and b, of directions u_a and u_b, and the tool along t
+with the axes at zero, u_a . d = u_a . R(u_b, b) t gives b, and the rotation about u_a from R(u_b, b) t to d gives a
+(subproblems of Paden and Kahan; Lynch and Park, Modern Robotics (2017), 6.1). The linear axes then follow from a linear
+system. Each axis must turn or move by its own position only.
 """
 
 from __future__ import annotations
@@ -17,38 +18,42 @@ from ncfix.machine.symbolic.derivation import DIRECTION, POSITION, Derivation
 from ncfix.values import frozen
 
 BRANCH = sp.Symbol("branch", real=True)
-"""Which of two solutions: +1 or -1."""
+"""Chooses one of two solutions: +1 or -1."""
 TARGET = sp.Matrix([sp.Symbol(name, real=True) for name in DIRECTION])
 TIP = sp.Matrix([sp.Symbol(name, real=True) for name in POSITION])
 
 
 @frozen
 class Inverse:
-    """Formulas per axis, in the order in which they can be evaluated, and what could not be had or must be known."""
+    """The inverse.
+
+    formulas  name of an axis -> formula of its position, in the order in which they can be evaluated
+    notes     explanations, and reasons for missing formulas
+    """
 
     formulas: Mapping[str, sp.Expr]
     notes: tuple[str, ...]
 
     def lines(self) -> Iterator[str]:
-        """As text."""
+        """The formulas and notes as lines of text."""
         yield from (f"{axis} = {formula}" for axis, formula in self.formulas.items())
         yield from self.notes
 
 
 @frozen
 class _Turn:
-    """A rotary axis: its direction with all axes at zero, with the sign in which it turns the tool."""
+    """A rotary axis: its direction with all axes at zero, about which a positive position turns the tool."""
 
     name: str
     direction: sp.Matrix
 
 
 class _UnreachableError(Exception):
-    """Why there is no closed form."""
+    """Raised with the reason if there is no closed form."""
 
 
 def inverse_nominal(derivation: Derivation) -> Inverse:
-    """The formulas that there are; what is missing is in the notes."""
+    """The inverse, with the reasons for missing formulas in its notes."""
     formulas: dict[str, sp.Expr] = {}
     notes: list[str] = []
     for solve in (_rotary, _linear):
@@ -101,7 +106,7 @@ def _turns(chain: Chain) -> tuple[list[_Turn], sp.Matrix]:
 
 
 def _to_level(outer: _Turn, inner: _Turn, tool: sp.Matrix) -> Expr:
-    """The inner angle at which the tool has the right angle to the outer axis."""
+    """The position of the inner axis at which the tool's angle to the outer axis is that of the target direction."""
     along = outer.direction.dot(inner.direction) * inner.direction.dot(tool)
     even = outer.direction.dot(tool) - along
     odd = outer.direction.dot(inner.direction.cross(tool))
@@ -117,7 +122,7 @@ def _to_level(outer: _Turn, inner: _Turn, tool: sp.Matrix) -> Expr:
 
 
 def _about(turn: _Turn, start: sp.Matrix) -> Expr:
-    """The angle about the axis from a start direction to the target."""
+    """The position of the axis that turns a start direction to the target direction."""
     u = turn.direction
     sine = u.dot(start.cross(TARGET))
     cosine = start.dot(TARGET) - u.dot(start) * u.dot(TARGET)
@@ -141,7 +146,7 @@ def _linear(derivation: Derivation) -> tuple[dict[str, Expr], list[str]]:
 
 
 def _cramer(matrix: sp.Matrix, right: sp.Matrix) -> tuple[list[Expr], Expr]:
-    """Adjugate times right-hand side, and determinant, simplified product by product."""
+    """The adjugate times the right-hand side, and the determinant, simplified after each product."""
     algebra = Algebra(sp.expand(entry) for entry in (*matrix, *right))
     rows = [[algebra.poly(matrix[i, k]) for k in range(3)] for i in range(3)]
     sides = [algebra.poly(entry) for entry in right]

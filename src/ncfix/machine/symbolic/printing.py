@@ -22,7 +22,7 @@ MEANINGS = (
 
 
 def to_text(derivation: Derivation) -> str:
-    """Plain text: variables, nominal formulas and their inverse, and the errors, one summand on each line."""
+    """The derivation as plain text: variables, nominal formulas, their inverse, and errors with a summand per line."""
     lines = [f"{derivation.chain.name}: errors to {ordinal(derivation.order)} order", "", "Variables"]
     lines += variable_table(derivation.chain.variables)
     lines += ["", "Nominal", f"  {MEANINGS[0]}"]
@@ -50,7 +50,7 @@ def ordinal(order: int) -> str:
 
 
 def variable_table(variables: Iterable[Variable]) -> Iterator[str]:
-    """One line per variable: symbol, size, sign where it is clockwise, value, definition."""
+    """A line for each variable: symbol, value, size, definition, and whether it is clockwise."""
     for variable in variables:
         value = "" if variable.value is None else f" = {variable.value:.12g}"
         sign = " (clockwise)" if variable.sign < 0 else ""
@@ -58,7 +58,7 @@ def variable_table(variables: Iterable[Variable]) -> Iterator[str]:
 
 
 def signed(coefficient: sp.Expr) -> tuple[str, sp.Expr]:
-    """The sign of a summand, and the rest."""
+    """The sign of a summand, "+" or "-", and the summand without it."""
     negative = coefficient.as_coeff_Mul()[0].is_negative
     return ("-", -coefficient) if negative else ("+", coefficient)
 
@@ -67,7 +67,7 @@ NAMES = {"dx": r"\delta_x", "dy": r"\delta_y", "dz": r"\delta_z", "rx": r"\rho_x
 
 
 def to_latex(derivation: Derivation) -> str:
-    """LaTeX: aligned equations for a document that loads amsmath; nominal formulas and error formulas."""
+    """The nominal and the error formulas as LaTeX: aligned equations, for a document that loads amsmath."""
     names = {}
     for variable in derivation.chain.variables:
         arguments = f"({', '.join(variable.arguments)})" if variable.arguments else ""
@@ -86,7 +86,7 @@ def to_latex(derivation: Derivation) -> str:
 
 
 def _latex(expression: sp.Expr, names: dict[sp.Expr, str]) -> str:
-    """sympy takes names for plain symbols only, so functions such as EXX(X) are put in as symbols first."""
+    """An expression as LaTeX with these names. Functions such as EXX(X) become symbols, as sympy names only those."""
     plain = {symbol: sp.Symbol(str(symbol)) for symbol in names if not symbol.is_Symbol}
     labels = {plain.get(symbol, symbol): name for symbol, name in names.items()}
     return sp.latex(expression.xreplace(plain), symbol_names=labels, fold_func_brackets=True)
@@ -102,13 +102,13 @@ def _latex_product(errors: str, size: sp.Expr, names: dict[sp.Expr, str]) -> str
 
 
 WIDTH = 116
-"""Characters in a line of the source."""
+"""Largest number of characters in a line of the source."""
 UNBROKEN = "\N{NO-BREAK SPACE}"
-"""A space at which no line ends."""
+"""A space at which no line is broken."""
 
 
 def to_python(derivation: Derivation) -> str:
-    """A module with `nominal(...) -> (..., 6)` and `error(...) -> (..., 6)`; everything broadcasts."""
+    """A Python module with `nominal(...) -> (..., 6)` and `error(...) -> (..., 6)`; all arguments broadcast."""
     chain = derivation.chain
     title = f"{chain.name}: errors to {ordinal(derivation.order)} order. mm, rad."
     table = "\n".join(variable_table(chain.variables))
@@ -127,7 +127,7 @@ def to_python(derivation: Derivation) -> str:
 
 
 def to_c(derivation: Derivation) -> str:
-    """C99: `void nominal(..., double result[6])` and `error`; every dimension and error is a parameter."""
+    """C99 source with `void nominal(..., double result[6])` and `error`; all dimensions and errors are parameters."""
     chain = derivation.chain
     title = f"{chain.name}: errors to {ordinal(derivation.order)} order. mm, rad."
     told = (title, "", *variable_table(chain.variables))
@@ -149,7 +149,7 @@ def to_c(derivation: Derivation) -> str:
 
 
 def compiled(derivation: Derivation) -> tuple[Callable[..., object], Callable[..., object]]:
-    """The functions `nominal` and `error` of that module, ready to be called."""
+    """The functions `nominal` and `error` of the Python module, ready to be called."""
     module: dict[str, Callable[..., object]] = {}
     exec(compile(to_python(derivation), f"<derived from {derivation.chain.name}>", "exec"), module)
     return module["nominal"], module["error"]
@@ -169,7 +169,7 @@ def _function(
 
 
 def _wrapped(head: str, parts: Iterable[str], tail: str, indent: str) -> list[str]:
-    """One line if it fits, else several in brackets."""
+    """Source on one line if it fits, else on several in brackets."""
     text = ", ".join(parts)
     if len(head) + len(text) + len(tail) <= WIDTH:
         return [head + text + tail]
