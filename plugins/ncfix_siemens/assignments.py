@@ -1,7 +1,7 @@
-"""The lines of a compensation file, and what they assign to a table, looked at as the control would.
+"""The lines of a compensation file, and their assignments to the variables of a table, checked as the control would.
 
 Function Manual Extended Functions, chapter K3: assignments to system variables, executed like a part program. Lines are
-read without loss: what is written back is what was read, to the byte.
+kept without loss, so that the file can be written back unchanged to the byte.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ HARMLESS = re.compile(
 )
 INCH = re.compile(r"\s*(?:N\d+\s*)?(?:INCH|G700?)\s*(?:;.*)?", re.IGNORECASE)
 VALUE_FILES = {"eec": b"$AA_ENC_COMP"}
-"""What tells an EEC file from a CEC file."""
+"""Kind of file -> text that only files of this kind contain; others are CEC files."""
 LIST = re.compile(r"SET\s*\(([^()]*)\)", re.IGNORECASE)
 SETTINGS = re.compile(r"\s*;\s*ncfix:\s*(.*)")
 WHOLE = 1e-6
-"""How far from a whole number (MAX - MIN) / STEP may be."""
-MOST = 100_000
-"""Points of a table, beyond any control's."""
+"""Largest deviation of (MAX - MIN) / STEP from a whole number."""
+MAX_POINTS = 100_000
+"""More points of a table than any control has."""
 BOOLS = ("FALSE", "TRUE")
-"""How SINUMERIK may write 0 and 1."""
+"""Words for 0 and 1."""
 KEEPS = "the control keeps what it had"
 
 
 @frozen
 class ArrayAssignment:
-    """`$NAME[index, ...]=value`, with what stands before it in its line, and the blanks and the comment after it."""
+    """An assignment `$NAME[index, ...]=value`, with the text before it in its line (lead) and after it (tail)."""
 
     line: int
     name: str
@@ -57,17 +57,17 @@ class ArrayAssignment:
 
     @property
     def text(self) -> str:
-        """The line again."""
+        """The text of the assignment with its surroundings."""
         return f"{self.lead}${self.name}{self.gap}[{','.join(self.indices)}]{self.equals}{self.value}{self.tail}"
 
     @property
     def number(self) -> float | None:
-        """The value, if it is a finite number; the control writes exponents with EX."""
+        """The value as a finite number, with exponent EX or E; None if it is none."""
         found = float(self.value.upper().replace("EX", "E")) if NUMBER.fullmatch(self.value) else math.inf
         return found if math.isfinite(found) else None
 
     def listed(self) -> Iterator[ArrayAssignment]:
-        """Itself; or, of SET(a, b, ...), one for each value, with the last index counting on."""
+        """The assignment itself; SET(a, b, ...) gives one for each value, with increasing last index."""
         match = LIST.fullmatch(self.value)
         if match is None or not self.indices[-1].strip().isdecimal():
             yield self
@@ -78,7 +78,7 @@ class ArrayAssignment:
 
 @frozen
 class OtherRow:
-    """Any other line, as it is."""
+    """Any other line, unchanged."""
 
     line: int
     text: str
@@ -88,12 +88,12 @@ FileRow = ArrayAssignment | OtherRow
 
 
 def parsed(text: str) -> list[FileRow]:
-    """The lines of a file; assignments are told from everything else, also several in a line."""
+    """The lines of a file, parsed; a line may hold several assignments."""
     return [line for number, row in enumerate(text.split("\n"), 1) for line in _lines(number, row)]
 
 
 def written(lines: Iterable[FileRow]) -> str:
-    """The file that the lines come from."""
+    """The text of a file with these lines."""
     found, last = "", 1
     for line in lines:
         found += "\n" * (line.line - last) + line.text
@@ -102,7 +102,7 @@ def written(lines: Iterable[FileRow]) -> str:
 
 
 def _lines(number: int, row: str) -> list[FileRow]:
-    """The assignments of a line, if it has nothing else; or the line as it is."""
+    """The assignments of a line if it holds nothing else; otherwise the line as `OtherRow`."""
     body = row.removesuffix("\r")
     block = BLOCK.match(body)
     at = block.end() if block else 0
@@ -124,7 +124,7 @@ def _lines(number: int, row: str) -> list[FileRow]:
 
 
 def assignments(lines: Iterable[FileRow], remarks: Remarks) -> Iterator[ArrayAssignment]:
-    """The assignments that the control executes, with remarks on everything that it would stumble over."""
+    """The assignments that the control executes, with remarks on lines at which it would stop."""
     found = list(lines)
     first = next((place for place, line in enumerate(found) if not COMMENT.fullmatch(line.text)), 0)
     if found and HEADER.fullmatch(found[first].text.strip()):
@@ -158,7 +158,7 @@ def _stumbled(line: FileRow, remarks: Remarks) -> None:
 
 
 def settings(lines: Iterable[FileRow]) -> dict[str, str]:
-    """What the comment `; ncfix: key=value ...` says."""
+    """The pairs of comments `; ncfix: key=value ...`."""
     found: dict[str, str] = {}
     for line in lines:
         if match := SETTINGS.fullmatch(line.text.removesuffix("\r")):
@@ -184,7 +184,7 @@ class Assigned:
     values: dict[int, ArrayAssignment] = field(default_factory=dict)
 
     def put(self, which: int | str, assignment: ArrayAssignment) -> None:
-        """Take a value by its number, or a field by its name; the last of several counts."""
+        """Store a value by its index, or a field by its name; a repeated one replaces the earlier one."""
         if which in self.values or which in self.fields:
             self.remarks.doubt(assignment.line, "is assigned twice: the control keeps the last", "a slip?")
         if isinstance(which, int):
@@ -193,7 +193,7 @@ class Assigned:
             self.fields[which] = assignment
 
     def lacks(self, needed: Iterable[str]) -> bool:
-        """Whether fields are missing, which is refused."""
+        """Whether any needed field is missing, which is also noted."""
         gone = [name for name in needed if name not in self.fields]
         if gone:
             first = next(iter([*self.values.values(), *self.fields.values()]))
@@ -202,7 +202,7 @@ class Assigned:
         return bool(gone)
 
     def number(self, name: str) -> float:
-        """A field as a number; 0, and refused, if it is none."""
+        """A field as a number; if it is none, 0, and a fault is noted."""
         return self._number(self.fields[name])
 
     def _number(self, assignment: ArrayAssignment) -> float:
@@ -212,7 +212,7 @@ class Assigned:
         return assignment.number or 0.0
 
     def choice(self, name: str, allowed: Sequence[int] | None = None) -> int:
-        """A field that is a whole number, one of those allowed; 0 if it is not there."""
+        """A field that is a whole number, one of `allowed`; 0 if it is missing. Others are noted as faults."""
         if name not in self.fields:
             return 0
         said = self.fields[name].value.upper()
@@ -223,7 +223,7 @@ class Assigned:
         return int(value)
 
     def curve(self, modulo: bool) -> Array | None:
-        """The values from MIN to MAX, (k + 1,); None if something is wrong with them."""
+        """The values from MIN to MAX, (k + 1,); None if they have a fault, which is noted."""
         before = len(self.remarks.wrong)
         last = self._last()
         if last:
@@ -242,14 +242,14 @@ class Assigned:
         return values
 
     def _last(self) -> int:
-        """k = (MAX - MIN) / STEP; 0, and refused, if there is none."""
+        """The last index k = (MAX - MIN) / STEP; if it is not a positive whole number, 0, and a fault is noted."""
         step, low, high = (self.number(name) for name in ("STEP", "MIN", "MAX"))
         line = self.fields["STEP"].line
         if step <= 0 or high <= low:
             self.remarks.refuse(line, f"a step of {step:g} from {low:g} to {high:g}")
             return 0
         steps = (high - low) / step
-        if steps > MOST:
+        if steps > MAX_POINTS:
             self.remarks.refuse(line, f"(MAX - MIN) / STEP is {steps:.6g}: no control has so many points")
             return 0
         if abs(steps - round(steps)) > WHOLE:

@@ -1,8 +1,8 @@
-"""SINUMERIK 840D sl, 828D, 802D sl: interpolatory compensation by tables of one input each, added and multiplied.
+"""The control `siemens`: SINUMERIK 840D sl, 828D, 802D sl, with CEC and EEC tables of one input, sums and products.
 
 Sources: Function Manual Extended Functions, 03/2013, chapter K3; 802D sl Function Manual, 11/2012; S. Esmaeili
-Marzdashti (Polytechnique Montreal, 2021), chapter 7, where 40 such tables were loaded. The sign of CEC values, and
-whether factors of a product are added by themselves, too, is in no public text: both must be said.
+Marzdashti (Polytechnique Montreal, 2021), chapter 7, where 40 such tables were loaded. No public text states the sign
+of CEC values, and whether the factors of a product are also added by themselves: both are settings that must be given.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ from ncfix_siemens.tables import CecTable, cec_text, eec_text
 
 CEC = "NC_CEC.INI"
 TABLES = re.compile(rb"(?im)^[^;\n]*\$(?:AN_CEC|AA_ENC_COMP)(?:_\w+)?[ \t]*\[")
-ROOM = 1.5
-"""MD32720 as a multiple of the largest correction."""
+SUM_FACTOR = 1.5
+"""MD32720 (largest total correction) as a multiple of the largest correction."""
 WORTH = 0.9
-"""Rotary axes keep their values if less than this share of what correcting them leaves at the worst is left then."""
+"""Rotary axes stay uncorrected if the largest error is then below this share of that with corrected ones."""
 WORTHLESS = 0.2
-"""Share of the error without tables that may be left at the worst, within the target, for a better orientation."""
+"""Largest error, as a share of that without tables, that is accepted (within the target) for a better orientation."""
 CHECKS = 1000
-"""Random poses at which schemes are compared."""
+"""Number of random poses at which schemes are compared."""
 
 
 class Siemens(FileControl):
@@ -61,7 +61,7 @@ class Siemens(FileControl):
     switch_off = SWITCH_OFF
 
     def _missing(self, given: Mapping[str, str]) -> Iterator[Message]:
-        """Whoever has not settled the sign has not settled the products either: both are asked for at once."""
+        """As of every control; if a setting is missing, `product_terms` is asked for at the same time."""
         missing = tuple(super()._missing(given))
         yield from missing
         if missing and "product_terms" not in given:
@@ -72,7 +72,7 @@ class Siemens(FileControl):
         return Message("NCF485", text, hint=f"--set product_terms=VALUE{self._how(OPTIONS['product_terms'])}")
 
     def write(self, request: Request) -> Written:
-        """`NC_CEC.INI`, and an EEC file for each axis if `positioning=eec`."""
+        """Write `NC_CEC.INI`, and an EEC file for each axis if `positioning=eec`."""
         settings = checked_settings(self.settings(request.settings), request.machine)
         scheme = _scheme(request, settings)
         own = [term for term in scheme.tables.terms if settings.eec and _own(term)]
@@ -96,7 +96,7 @@ class Siemens(FileControl):
         return Written(files, tuple(_notes(request, settings, scheme, cec)), least)
 
     def probe(self, request: Request) -> Written:
-        """Two small files that settle `value_sign` and `product_terms`, and what to do with them."""
+        """Two probe files that show `value_sign` and `product_terms` on the machine, and their instructions."""
         settings = checked_settings(request.settings, request.machine)
         ranges = {
             axis.name: (low / axis.unit, high / axis.unit)
@@ -105,7 +105,7 @@ class Siemens(FileControl):
         return Written(probe_files(dict(settings.axes), ranges, settings.style))
 
     def examined(self, files: Files) -> tuple[Compensation | None, list[Remarks]]:
-        """Tables of both kinds, as what comments say of sign, products and letters has them."""
+        """The tables of both kinds, interpreted by the comments on sign, products and axis letters."""
         folder = read_folder(files)
         reading, unsaid = reading_of(folder)
         remarks = [*folder.remarks, unsaid]
@@ -114,17 +114,17 @@ class Siemens(FileControl):
         return as_corrections(folder, reading), remarks
 
     def knows(self, name: str, content: bytes) -> bool:
-        """Assignments to values of tables."""
+        """Whether the file assigns variables of compensation tables."""
         return TABLES.search(content) is not None
 
     def look(self, files: Files) -> tuple[Message, ...]:
-        """See `Control`; but for sign, products and letters of axes, which only comments of ncfix say."""
+        """See `Control`; sign, products and axis letters are checked only if comments of ncfix state them."""
         folder = read_folder(files)
         return self.lint(files) if folder.said else messages_of(folder.remarks)
 
 
 def _scheme(request: Request, settings: Settings) -> Scheme:
-    """The tables that the settings ask for."""
+    """The tables by the scheme of the settings; with `rotary=auto` the better of both ways."""
     job = SchemeTask(request.machine, request.space, request.tool_length, request.target, settings.limits)
     if settings.scheme != "auto":
         return fixed(job, settings.scheme)
@@ -155,7 +155,7 @@ def _own(term: Term) -> bool:
 
 
 def _heads(settings: Settings) -> list[str]:
-    """What the reader must know, and people."""
+    """Comments at the top of a file: the settings for the reader, and a reference for people."""
     said = [f"value_sign={settings.sign}", f"product_terms={settings.terms}"]
     said += [f"{letter}={axis}" for letter, axis in settings.axes.items()]
     said += [f"most_tables={settings.limits.tables}", f"most_points={settings.limits.points}"]
@@ -163,7 +163,7 @@ def _heads(settings: Settings) -> list[str]:
 
 
 def _titles(tables: Sequence[CecTable], settings: Settings) -> dict[int, str]:
-    """A comment for each table; numbers are those that MULT_BY_TABLE takes."""
+    """A comment for each table, with its number as used by MULT_BY_TABLE."""
     letters = {axis: letter for letter, axis in settings.axes.items()}
     pointed = {table.multiply for table in tables}
     found = {}
@@ -197,7 +197,7 @@ def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[C
 
 
 def _turned(request: Request, scheme: Scheme) -> Iterator[str]:
-    """What becomes of the orientation of the tool."""
+    """Notes on the orientation error of the tool without tables and with them."""
     if not request.machine.rotary.any():
         return
     q = random_poses(request.space, CHECKS, seed=9)
@@ -211,9 +211,9 @@ def _turned(request: Request, scheme: Scheme) -> Iterator[str]:
 
 
 def _sums(request: Request, settings: Settings, scheme: Scheme) -> Iterator[str]:
-    """Limits of the total correction, in case that an assumption is wrong."""
+    """A note with limits of the total correction (MD32720), which prevent the worst if an assumption is wrong."""
     parts = []
-    for axis, value in zip(request.machine.axes, (ROOM * _largest(request, scheme)).tolist(), strict=True):
+    for axis, value in zip(request.machine.axes, (SUM_FACTOR * _largest(request, scheme)).tolist(), strict=True):
         if value:
             parts.append(f"{settings.axes[axis.name]} {value / axis.unit:.4f} {'degree' if axis.rotary else 'mm'}")
     if parts:

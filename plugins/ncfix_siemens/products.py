@@ -1,7 +1,7 @@
-"""Between neutral sums and products and the control's tables: signs, units, and what a product adds.
+"""Conversion between neutral sums and products of tables and the control's CEC and EEC tables: signs, units, products.
 
-Only one factor of a pair carries sign and unit: the table that points, the base. The multiplier is a plain number.
-The files of a folder are taken as the control would: CEC and EEC tables, with what their comments say of them.
+In a product, the base (the table with MULT_BY_TABLE) carries sign and unit; the multiplier has no unit. The files of a
+folder are read as the control would, together with the comments of ncfix that state their meaning.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ UNSAID = "ncfix writes it as a comment: ; ncfix: value_sign=error product_terms=
 
 @frozen
 class TableReading:
-    """How the control takes tables.
+    """The meaning of tables in the control.
 
-    axes   letter -> machine axis
-    sign   what a value of 1 does: 1 a correction, -1 an error
-    terms  one of `TERMS`; "" if there are no products
+    axes   axis letter -> machine axis
+    sign   1: values are corrections; -1: values are errors
+    terms  what a product adds, one of `TERMS`; "" if there are no products
     """
 
     axes: Mapping[str, str]
@@ -39,7 +39,7 @@ class TableReading:
 
 
 def tables_of(terms: Iterable[Term], reading: TableReading) -> list[CecTable]:
-    """The control's tables: multipliers go before the tables that point at them."""
+    """The control's tables for some terms; a multiplier comes before the tables that refer to it."""
     tables: list[CecTable] = []
     multipliers: dict[int, tuple[int, float]] = {}
     terms = list(terms)
@@ -61,7 +61,7 @@ def tables_of(terms: Iterable[Term], reading: TableReading) -> list[CecTable]:
 
 
 def _shared(centre: Grid, terms: Sequence[Term], reading: TableReading) -> float:
-    """How large the multiplier is made: as large as its largest base, so that neither does harm by itself."""
+    """The factor on a multiplier that makes it as large as its largest base, so that neither does harm by itself."""
     own = float(np.abs(centre.values).max()) or 1.0
     bases = [term.factors[0] for term in terms if any(factor is centre for factor in term.factors[1:])]
     largest = max(float(np.abs(base.values).max()) / unit_of(base.outputs[0]) for base in bases) * own
@@ -80,7 +80,7 @@ def _table(index: int, grid: Grid, factor: float, output: str, reading: TableRea
 
 
 def _balanced(tables: list[CecTable], terms: str) -> list[CecTable]:
-    """With tables that take off again what the control adds besides the products."""
+    """The tables, with further ones that cancel what the control adds besides the products."""
     pointed = {table.multiply - 1 for table in tables if table.multiply}
     extra = [
         table
@@ -94,7 +94,7 @@ def _balanced(tables: list[CecTable], terms: str) -> list[CecTable]:
 
 
 def compensation(tables: Sequence[CecTable], reading: TableReading) -> Compensation:
-    """What the control does with its tables."""
+    """The correction of the control's CEC tables."""
     letters = {axis: letter for letter, axis in reading.axes.items()}
     pointed = {table.multiply for table in tables if table.multiply}
     multipliers = {table.index + 1: _grid(table, letters, reading, plain=True) for table in tables}
@@ -122,7 +122,7 @@ def _grid(table: CecTable, letters: Mapping[str, str], reading: TableReading, pl
 
 @frozen
 class Folder:
-    """Tables of each kind, what comments say, and remarks on every file."""
+    """The tables of a folder by kind, the settings stated in comments, and remarks on every file."""
 
     cec: tuple[CecTable, ...]
     eec: tuple[CecTable, ...]
@@ -131,7 +131,7 @@ class Folder:
 
 
 def read_folder(files: Files) -> Folder:
-    """Everything that is in the files."""
+    """Read all files of a folder."""
     cec: list[CecTable] = []
     eec: list[CecTable] = []
     said: dict[str, str] = {}
@@ -152,9 +152,9 @@ def read_folder(files: Files) -> Folder:
 
 
 def _look_across(folder: Folder, remarks: Remarks) -> None:
-    """What only shows when all tables are looked at together.
+    """Note faults that only show in all tables together: double correction, too many tables, one-sided tables.
 
-    Where factors are added by themselves, too, a table of an axis over itself takes that off again.
+    If the control also adds the factors of products, a table of an axis over itself cancels that, and is no fault.
     """
     own = {table.output for table in folder.eec}
     pointed = {table.multiply for table in folder.cec if table.multiply}
@@ -177,7 +177,7 @@ def _look_across(folder: Folder, remarks: Remarks) -> None:
 
 
 def reading_of(folder: Folder) -> tuple[TableReading | None, Remarks]:
-    """How the tables are to be taken, from what the comments say, with remarks on what they do not say."""
+    """The meaning of the tables, from comments, with remarks on missing statements; None if any is missing."""
     remarks = Remarks(folder.remarks[0].path if folder.remarks else "")
     axes = {key: value for key, value in folder.said.items() if len(key) == 1}
     used = {name for table in (*folder.cec, *folder.eec) for name in (table.input, table.output)}
@@ -194,6 +194,6 @@ def reading_of(folder: Folder) -> tuple[TableReading | None, Remarks]:
 
 
 def as_corrections(folder: Folder, reading: TableReading) -> Compensation:
-    """What the tables do together. EEC values are errors, whatever those of CEC are."""
+    """The correction of all tables of a folder. EEC values are errors, whatever those of CEC are."""
     plain = TableReading(reading.axes, -1, "")
     return Compensation((*compensation(folder.cec, reading).terms, *compensation(folder.eec, plain).terms))

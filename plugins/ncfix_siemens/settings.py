@@ -1,6 +1,6 @@
-"""What is known of the format, what is assumed, and the settings; and two small files that settle these on the machine.
+"""Properties, assumptions and settings of SINUMERIK tables, and two probe files that verify assumptions on the machine.
 
-No public text says what sign the values have, and what a product adds: the probes move an axis, and a dial gauge tells.
+No public text states the sign of the values or what a product adds. The probes move an axis, read by a dial gauge.
 """
 
 from __future__ import annotations
@@ -97,14 +97,14 @@ SWITCH_OFF = (
     "MD32710 $MA_CEC_ENABLE = 0 for every axis (EEC: MD32700 = 0), or SD41300 $SN_CEC_TABLE_ENABLE[t] = 0 by table."
 )
 MODELS = {"840D": (40, 1000), "828D": (8, 200), "802D": (2, 350)}
-"""Tables and points of each. 828D and 802D sl from the manuals; 40 tables have been run on an 840D (Esmaeili, 2021)."""
+"""Model -> tables, points per table. 828D, 802D sl: manuals; 40 tables have been run on an 840D (Esmaeili, 2021)."""
 BESIDE = {"plus_multiplier": (1, 0), "plus_base": (0, 1), "plus_both": (1, 1)}
-"""Tables that take off again what a control adds besides a product: of its multiplier, and of what it multiplies."""
+"""Setting -> further tables that cancel what a control adds besides a product: per multiplier, and per base."""
 MOST_TABLES, MOST_POINTS = 128, 5000
 SCHEMES = ("auto", "poly25", "trigo23", "fik40", "fik20")
 SIGNS = ("error", "correction")
 TERMS = ("only", "plus_multiplier", "plus_base", "plus_both")
-"""What a product adds: itself, and its multiplier, or its base, or both of them by themselves as well."""
+"""What a control adds for a product: only the product, or also its multiplier, its base, or both."""
 AXIS_NAME = re.compile(r"\w{1,16}", re.ASCII)
 YES_NO = one_of("yes", "no")
 OPTIONS: Mapping[str, Option] = {
@@ -135,12 +135,12 @@ SIGN_PROBE, PRODUCT_PROBE, PROBE_SHEET = "PROBE_SIGN_CEC.INI", "PROBE_PRODUCT_CE
 PROBE_SHIFT = 0.01
 PROBE_BASE, PROBE_MULTIPLIER = 0.1, 0.2
 PROBE_READINGS = {"only": 0.02, "plus_multiplier": 0.22, "plus_base": 0.12, "plus_both": 0.32}
-"""What X moves by in the second probe, mm."""
+"""Setting `product_terms` -> motion of X in the second probe, mm."""
 
 
 @frozen
 class Settings:
-    """All of them, in a form to work with."""
+    """The settings, parsed."""
 
     sign: str
     terms: str
@@ -170,7 +170,10 @@ def checked_settings(given: Mapping[str, str], machine: Machine) -> Settings:
 
 
 def machine_axes(given: str, machine: Machine) -> dict[str, str]:
-    """Axis letter -> machine axis. The letter tells whether a position is in degree, so it must be one of its kind."""
+    """Axis letter -> machine axis, from the setting `axes` or by default; raises `UsageError` NCF485.
+
+    The letter tells whether positions are in mm or degree, so it must fit the axis.
+    """
     names = machine.axis_names
     ordered = in_order(machine)
     if not given:
@@ -184,7 +187,7 @@ def machine_axes(given: str, machine: Machine) -> dict[str, str]:
 
 
 def probe_files(axes: dict[str, str], ranges: dict[str, tuple[float, float]], style: CecStyle) -> dict[str, bytes]:
-    """The files, and what to do with them. X is moved by a constant, whatever the axes do."""
+    """The probe files and their instructions. They move X by a constant, wherever the axes are."""
     if not {"X", "Z"} <= set(axes):
         raise RefusedError.of("NCF484", f"the probe moves X and looks up Z; the machine has {' '.join(axes)}")
     x, z = (_whole(axis, ranges) for axis in "XZ")
@@ -199,7 +202,7 @@ def probe_files(axes: dict[str, str], ranges: dict[str, tuple[float, float]], st
 
 
 def _whole(axis: str, ranges: dict[str, tuple[float, float]]) -> tuple[float, float]:
-    """The range in whole millimetres, so that no step is odd."""
+    """The range of an axis, widened to whole millimetres."""
     low, high = ranges[axis]
     return float(np.floor(low)), float(np.ceil(high))
 

@@ -1,4 +1,4 @@
-"""One compensation table of the control, and the files of them, with remarks on what is wrong in these.
+"""A compensation table of SINUMERIK, and writers and readers of its files (CEC and EEC) with remarks on faults.
 
 CEC, `%_N_NC_CEC_INI`: any axis over any axis. EEC (LEC), `%_N_AX1_EEC_INI`: an encoder over its own axis; its values
 are errors.
@@ -26,29 +26,29 @@ NEEDED = CEC_FIELDS[:5]
 LINKS = ("INPUT_NCU", "OUTPUT_NCU")
 CEC_VALUE = "AN_CEC"
 STEEP = 0.01
-"""mm per mm: no machine errs that fast."""
+"""Largest plausible slope of a table, mm per mm."""
 CLEARLY = 1.001
-"""How much larger than the largest positive value the largest negative one must be to be remarked on."""
+"""Ratio of the largest negative to the largest positive value from which a multiplier gets a remark."""
 BOTH_WAYS = 0
 FLIPPED = "ncfix writes it positive; a sign that is turned in both factors of a pair turns nothing"
 LARGE = 1.0
-"""mm or degree: no machine is that wrong; most likely the unit is."""
+"""Largest plausible value, mm or degree; larger ones are probably in another unit."""
 EEC_FIELDS = ("STEP", "MIN", "MAX", "IS_MODULO")
 EEC_VALUE = "AA_ENC_COMP"
 
 
 @frozen
 class CecTable:
-    """Values at evenly spaced positions of an axis.
+    """A table: values at evenly spaced positions of an axis.
 
-    index      of the table (CEC), or of the encoder (EEC)
+    index      index of the table (CEC), or of the encoder (EEC)
     input      machine axis that is looked up, e.g. AX1
     output     machine axis that is corrected
-    low, step  first position and distance, mm or degree
-    values     (k + 1,) mm or degree; those of a multiplier are plain numbers
-    direction  0: always; 1, -1: only while the input axis moves that way
-    multiply   number (index + 1) of the table that it is multiplied by; 0: none
-    modulo     the values repeat
+    low, step  first position and spacing, mm or degree
+    values     (k + 1,) mm or degree; without unit for a multiplier
+    direction  0: always active; 1, -1: only while the input axis moves in this direction
+    multiply   number (index + 1) of the table by which it is multiplied; 0: none
+    modulo     whether the values repeat
     """
 
     index: int
@@ -79,14 +79,14 @@ class CecTable:
 
 
 def number(value: float, digits: int = DIGITS) -> str:
-    """As short as it can be with these decimals, and always with a decimal point."""
+    """A number as short text with at most `digits` decimals, always with a decimal point."""
     text = f"{round(value, digits) + 0.0:.{digits}f}".rstrip("0")
     return f"{text}0" if text.endswith(".") else text
 
 
 @frozen
 class CecStyle:
-    """What is left open: axis names in brackets, a METRIC line, a path line."""
+    """Optional forms of a CEC file: axis names in brackets, a METRIC line, a path line."""
 
     brackets: bool = True
     metric: bool = False
@@ -94,7 +94,7 @@ class CecStyle:
 
 
 def cec_text(tables: Iterable[CecTable], heads: Iterable[str], titles: Mapping[int, str], style: CecStyle) -> bytes:
-    """The file; `heads` are comments for its top, `titles` one for each table."""
+    """The CEC file; heads: comments at the top; titles: index of a table -> comment before it."""
     lines = ["%_N_NC_CEC_INI"]
     lines += [f";$PATH={style.path}"] if style.path else []
     lines += ["METRIC"] if style.metric else []
@@ -116,7 +116,7 @@ def _assigned(table: CecTable, style: CecStyle) -> Iterator[str]:
 
 
 def read_cec(lines: Iterable[FileRow], remarks: Remarks) -> list[CecTable]:
-    """The tables of a file, by index, with remarks; a table that is not complete is left out."""
+    """The CEC tables of a file, by index, with remarks; incomplete tables are skipped."""
     found: dict[int, Assigned] = {}
     for assignment in assignments(lines, remarks):
         name = assignment.name.upper()
@@ -190,7 +190,7 @@ def _look_at_pair(table: CecTable, other: CecTable | None, line: int, remarks: R
 
 
 def _look_at_sizes(table: CecTable, found: Assigned, remarks: Remarks) -> None:
-    """A value that no machine needs, or a jump from one to the next; of tables that are added."""
+    """Note implausibly large values and jumps in a table that is added."""
     largest = int(np.argmax(np.abs(table.values)))
     if abs(table.values[largest]) > LARGE:
         text = f"a value of {table.values[largest]:g}, which no machine needs"
@@ -203,7 +203,7 @@ def _look_at_sizes(table: CecTable, found: Assigned, remarks: Remarks) -> None:
 
 
 def eec_text(table: CecTable, heads: Iterable[str]) -> bytes:
-    """The file of one encoder."""
+    """The EEC file of one encoder."""
     axis, encoder = table.output, table.index
     lines = [f"%_N_{axis}_EEC_INI", "CHANDATA(1)", *(f"; {head}" for head in heads)]
     lines += [f"$AA_ENC_COMP[{encoder},{n},{axis}]={number(value)}" for n, value in enumerate(table.values.tolist())]
@@ -214,7 +214,7 @@ def eec_text(table: CecTable, heads: Iterable[str]) -> bytes:
 
 
 def read_eec(lines: Iterable[FileRow], remarks: Remarks) -> list[CecTable]:
-    """The tables of a file, with remarks; one that is not complete is left out."""
+    """The EEC tables of a file, with remarks; incomplete tables are skipped."""
     found: dict[tuple[int, str], Assigned] = {}
     for assignment in assignments(lines, remarks):
         name = assignment.name.upper()

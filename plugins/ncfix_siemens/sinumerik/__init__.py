@@ -1,1 +1,1 @@
-"""SINUMERIK 840D: its blocks, what they mean, and how corrected motions are put into them."""
+"""The language of SINUMERIK 840D: parsing, following and rewriting of programs."""

@@ -1,4 +1,4 @@
-"""Where control structures, jumps, repetitions and calls of SINUMERIK lead, as operations."""
+"""Control structures, jumps, repetitions and calls of SINUMERIK as operations of a `ProgramFlow`."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ SKIPPED_PART = "a part of this structure is skipped by block delete (/): whether
 
 
 LABELS = re.compile(r"\s*((?!N\d+\b)[A-Z_]\w*)\s*:\s*((?!N\d+\b)[A-Z_]\w*)\s*", re.IGNORECASE)
-"""Two labels; block numbers are none, since they may change."""
+"""Two labels `FIRST:LAST`; block numbers are not accepted, since they may change."""
 
 
 class Stretch(NamedTuple):
-    """Blocks of a text, from `start` up to `stop`."""
+    """The blocks of a unit from `start` up to, not including, `stop`."""
 
     unit: SinumerikUnit
     start: int
@@ -32,11 +32,11 @@ class Stretch(NamedTuple):
 
 
 class AtRuntimeError(Exception):
-    """What is executed next is decided at run time."""
+    """Raised if the next block depends on a value known only at run time."""
 
 
 def decided(value: Value) -> float:
-    """A number that decides where to go on; raises `AtRuntimeError` where only the control knows it."""
+    """A value that decides on the flow, as a number; raises `AtRuntimeError` if it is known only at run time."""
     found = number(value)
     if found is None:
         raise AtRuntimeError
@@ -44,16 +44,16 @@ def decided(value: Value) -> float:
 
 
 def told(value: Value) -> str:
-    """A text that names a label; raises `AtRuntimeError` where only the control knows it."""
+    """A value that names a label, in upper case; raises `AtRuntimeError` if it is known only at run time."""
     if not isinstance(value, str):
         raise AtRuntimeError
     return value.upper()
 
 
 class SinumerikFlow(ProgramFlow[SinumerikUnit]):
-    """Where execution stands, and what takes it elsewhere.
+    """The program flow of SINUMERIK.
 
-    times  how often the block that is executed says (P); None where only the control knows
+    times  number of repetitions (P) of the current block; None if known only at run time
     """
 
     most_calls = 16
@@ -67,7 +67,7 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
     # -- control structures -------------------------------------------------------------------------------------------
 
     def lowered(self, step: Branching, steps: Sequence[Branching], here: int) -> tuple[Operation, ...]:
-        """What a control structure or jump of block `here` comes down to; `steps`: all of the block."""
+        """The operations of a control structure or jump in block `here`; steps: all of that block."""
         unit, keyword = self.unit, step.keyword
         jump = next((each for each in steps if each.keyword.startswith("goto")), None)
         if keyword.startswith("goto"):
@@ -108,7 +108,7 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
         return ()
 
     def _check_whole(self, here: int) -> None:
-        """Raise `Fault` where a part of the structure of a block is skipped: the control may not find it."""
+        """Raise `Fault` if a part of the block's structure is deleted by block skip: the control may not find it."""
         unit = self.unit
         for block in unit.parts_of(here) if unit.some_deletable else ():
             skip = unit.plan(block).skip
@@ -116,11 +116,11 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
                 raise Fault(BROKEN, SKIPPED_PART)
 
     def holds(self, step: Branching) -> bool:
-        """Whether a condition holds."""
+        """Whether the condition of a step holds; raises `AtRuntimeError`."""
         return decided(step.values[0](self.control)) != 0.0
 
     def _goes_in(self, step: Branching, here: int) -> bool:
-        """Whether what is in a structure is executed; FOR: as long as its variable is not past the last value."""
+        """Whether the body of a structure is executed; FOR: while its variable does not exceed the last value."""
         if step.keyword == "for":
             value, last = step.values[0](self.control), step.values[2](self.control)
             self.unit.end_of(here, "for")
@@ -132,12 +132,12 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
         return holds
 
     def _goes_on(self, step: Branching, here: int) -> bool:
-        """UNTIL: whether the loop goes on."""
+        """Whether the loop of an UNTIL is repeated."""
         self.unit.begin_of(here, step.keyword)
         return not self.holds(step)
 
     def _next(self, here: int) -> bool:
-        """ENDFOR: one more; whether the loop goes on."""
+        """At ENDFOR, increment the variable; whether the loop is repeated."""
         begin = self.unit.begin_of(here, "endfor")
         self.control.first = self.unit.first[begin]
         loop = next(each for each in self.unit.branchings(begin) if each.keyword == "for")
@@ -145,7 +145,7 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
         return self._goes_in(loop, begin)
 
     def _assign(self, loop: Branching, value: Value, step: float) -> None:
-        """Give the variable of FOR a value, and a step more."""
+        """Set the variable of a FOR loop to `value` plus `step`."""
         key = self.key_of(loop.written[0])
         if key is None:
             raise AtRuntimeError
@@ -157,7 +157,7 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
         return decided(choice.values[0](self.control)) == number(value(self.control))
 
     def _goto(self, step: Branching, here: int, when: Callable[[], bool] | None = None) -> Jump:
-        """`GOTOF label` and its like."""
+        """The jump of GOTO, GOTOF, GOTOB, GOTOC or GOTOS, under the condition `when`."""
         unit, keyword = self.unit, step.keyword.rpartition(" ")[2]
 
         def target() -> int | None:
@@ -174,7 +174,7 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
         return Jump(unit.begin, when) if keyword == "gotos" else Jump(target, when, out=True)
 
     def _section(self, step: Branching, here: int) -> Repeat:
-        """`REPEAT label`, `REPEAT first last`, `REPEATB label`."""
+        """The repetition of `REPEAT label`, `REPEAT first last` or `REPEATB label`."""
         unit = self.unit
 
         def start() -> int:
@@ -202,7 +202,7 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
         return Repeat(start, times, stop)
 
     def stretch(self, name: str, find: Callable[[str], SinumerikUnit | None]) -> Stretch | None:
-        """The blocks that a contour cycle names: a subprogram, `NAME`, or those from label to label, `FIRST:LAST`."""
+        """The blocks of a contour: a subprogram `NAME`, or those between labels `FIRST:LAST`; None if not found."""
         if labels := LABELS.fullmatch(name):
             here = self.block - 1
             start, last = (self.unit.find(label.upper(), here, "goto") for label in labels.groups())
@@ -213,14 +213,14 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
         return None if unit is None or unit is self.unit else Stretch(unit, unit.begin, unit.stop)
 
     def go_along(self, stretch: Stretch, name: str, leave: Callable[[], object]) -> None:
-        """Execute blocks as those of a subprogram."""
+        """Execute a stretch of blocks like a subprogram; `leave` is called at its end."""
         self.enter(OpenCall(name, (stretch.unit, stretch.start), leave=leave))
         self.sections.append(Section(stretch.start, stretch.stop, stretch.unit.stop, 1))
 
     # -- variables ----------------------------------------------------------------------------------------------------
 
     def let(self, step: AssignedVariable) -> None:
-        """Give a variable its value."""
+        """Execute an assignment to a variable."""
         variables = self.control.variables
         if step.value is None:
             index: tuple[Value, ...] = tuple(part(self.control) for part in step.index)
@@ -238,7 +238,7 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
         variables.assign((step.name, tuple(place for place in places if place is not None)), value)
 
     def key_of(self, expression: Expression | None) -> Key | None:
-        """The variable that an expression names, if it names one."""
+        """The variable that an expression names; None if it names none."""
         match expression:
             case NamedParameter(name):
                 return name
@@ -252,7 +252,7 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
     def called(
         self, unit: SinumerikUnit, arguments: Sequence[Evaluate], written: Sequence[Expression | None], times: int
     ) -> OpenCall[SinumerikUnit] | None:
-        """The call of a subprogram; None where it is not executed."""
+        """The call of a subprogram with arguments; None if it is executed no times."""
         self.check_depth(unit.name)
         if times < 1:
             return None
@@ -293,6 +293,6 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
         return OpenCall(unit.name, (unit, unit.begin), times - 1, leave=leave)
 
     def finish(self, kind: str = "", *, again: bool = True) -> None:
-        """See `ProgramFlow`; a subprogram that is gone through counts as a block."""
+        """See `ProgramFlow`; a finished subprogram counts as one block of the budget."""
         self.budget.spend(1 if self.calls else 0)
         super().finish(kind, again=again)

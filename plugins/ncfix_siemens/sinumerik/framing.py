@@ -1,4 +1,4 @@
-"""Frames, planes, diameters, tools: what a block sets before it moves.
+"""Frames, planes, units, feeds and tools: settings of a block that take effect before its motion.
 
 Source: Siemens, "SINUMERIK 840D sl, NC programming": frames, CYCLE800, tool offsets.
 """
@@ -44,9 +44,10 @@ PLANE_LENGTH = (
 
 
 def programmable(control: Sinumerik, name: str, words: BlockWordValues) -> None:
-    """TRANS, ROT, SCALE, MIRROR and, with A before them, what is added to what is in force.
+    """Execute TRANS, ROT, SCALE, MIRROR, and their additive forms ATRANS, AROT, ASCALE, AMIRROR.
 
-    One without A ends all that was in force, so one that is known only at run time counts up to the next of these.
+    A form without A replaces the whole programmable frame. So a frame known only at run time matters until the next one
+    without A.
     """
     kind = name.removeprefix("a") if name.startswith("a") else name
     if any(value is None for value in words.values.values()):
@@ -60,7 +61,7 @@ def programmable(control: Sinumerik, name: str, words: BlockWordValues) -> None:
     modes = control.modes
     before = control.frames.programmable if name != kind else WORLD
     if name == kind:
-        if modes.fine and axis_values(words):  # whether what G59 has set goes with the one before is told in two ways
+        if modes.fine and axis_values(words):  # sources disagree on whether the shift of G59 stays
             control.suspend("frame", FINE_STAYS.format(name.upper()))
         modes.added, modes.fine = ZEROS, False
     elif name == "atrans":
@@ -71,21 +72,21 @@ def programmable(control: Sinumerik, name: str, words: BlockWordValues) -> None:
 
 
 def translation(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
-    """TRANS."""
+    """The frame of TRANS, and why it is doubtful ("" if it is not)."""
     steps = {INDEX[letter]: value for letter, value in axis_values(words).items()}
     doubtful = DIAMETER_SHIFT.format(control.modes.diameter) if control.modal.diameter and steps.get(0) else ""
     return shifted({index: value * unit(control, index) for index, value in steps.items()}), doubtful
 
 
 def rotation(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
-    """ROT X Y Z, or ROT RPL in the plane."""
+    """The frame of ROT X Y Z, or ROT RPL in the plane."""
     if "RPL" in words.values:
         return turned_in(control.modal.plane, words.get("RPL")), ""
     return turned(axis_values(words)), ""
 
 
 def scaling(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
-    """SCALE: one factor for all three axes is followed."""
+    """The frame of SCALE; only one factor for all three axes is followed."""
     factors = axis_values(words)
     plain = {letter: factor for letter, factor in factors.items() if factor != 1.0}
     if not plain:
@@ -96,7 +97,7 @@ def scaling(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
 
 
 def mirroring(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
-    """MIRROR: the axes named run the other way."""
+    """The frame of MIRROR, which reverses the named axes."""
     letters = "".join(axis_values(words))
     if set(letters) - set("XYZ"):
         return WORLD, ROTARY_FRAME.format("mirroring (MIRROR)") + " is in force, which ncfix does not follow"
@@ -124,12 +125,12 @@ def axis_values(words: BlockWordValues) -> dict[str, float]:
 
 
 def unit(control: Sinumerik, index: int) -> float:
-    """mm or rad per unit of a shift; a shift of X is no diameter."""
+    """mm or rad per unit of a shift; a shift of X counts as a radius."""
     return control.of_setup(LETTERS[index]) * (1.0 if control.rotary[index] else control.modal.unit)
 
 
 def programmed_shift(control: Sinumerik, words: BlockWordValues, code: int) -> None:
-    """G58 and G59 with axis words replace the absolute and the additive part of the shift."""
+    """G58 (code 580) and G59 (590): replace the absolute or the additive part of the programmable shift."""
     values = {INDEX[letter]: value * unit(control, INDEX[letter]) for letter, value in axis_values(words).items()}
     if any(value is None for value in words.values.values()):
         control.refuse_rest(FRAME_AT_RUNTIME.format(f"G{code // 10}"))
@@ -165,7 +166,7 @@ def units(control: Sinumerik, code: int) -> None:
 
 
 def settable(control: Sinumerik, code: int) -> None:
-    """G54 to G57, G505 to G599; G500 switches them off."""
+    """G54 to G57 and G505 to G599 select a settable frame; G500 deselects it."""
     name = f"G{code // 10}"
     control.modes.carried = ""
     if control.resume("measured"):
@@ -176,7 +177,7 @@ def settable(control: Sinumerik, code: int) -> None:
 
 
 def mind_carried(control: Sinumerik) -> None:
-    """The first motion after TRAORI or TRAFOOF: say it if the work offset has not been programmed anew."""
+    """At the first motion after TRAORI or TRAFOOF, warn (NCF255) if the work offset was not programmed again."""
     frames, name = control.frames, control.modes.carried
     control.modes.carried = ""
     if name and any(frames.datum.shift):
@@ -185,7 +186,7 @@ def mind_carried(control: Sinumerik) -> None:
 
 
 def feed_mode(control: Sinumerik, code: int) -> None:
-    """G93, G94, G95, and G96, G961, G97, G971, which go with feeds per turn or minute; G962 goes with either."""
+    """G93, G94, G95; and G96, G961, G97, G971, which imply feed per revolution or minute (G962 keeps the mode)."""
     now = control.modal.feed_mode
     mode = {960: 95, 970: 95, 9610: 94, 9620: now, 9710: 94}.get(code, code // 10)
     if mode != now:
@@ -196,7 +197,7 @@ def feed_mode(control: Sinumerik, code: int) -> None:
 
 
 def path_mode(control: Sinumerik, code: int) -> None:
-    """G60, G64, G641 to G645."""
+    """G60 sets exact stop; G64 and G641 to G645 clear it."""
     control.modal.exact_stop = code == 600
 
 
@@ -212,7 +213,7 @@ def compensation(control: Sinumerik, code: int) -> None:
 
 
 def tool(control: Sinumerik, words: BlockWordValues, change: bool, at_once: bool) -> None:
-    """T, D and M6: `at_once` where the program has no M6, so that T itself changes the tool."""
+    """Execute T, D and M6. change: M6 is in the block; at_once: the program has no M6, so T itself changes the tool."""
     called, edge = "T" in words.values or "T" in words.texts, "D" in words.values
     if called and not call_tool(control, words):
         return
@@ -229,7 +230,7 @@ def tool(control: Sinumerik, words: BlockWordValues, change: bool, at_once: bool
 
 
 def call_tool(control: Sinumerik, words: BlockWordValues) -> bool:
-    """T: the tool that is changed next; False where that is not known."""
+    """Execute T, which selects the next tool; False if it is known only at run time."""
     control.fresh_tool = True
     name, value = words.texts.get("T"), words.values.get("T")
     if name is None and value is None:
@@ -240,7 +241,7 @@ def call_tool(control: Sinumerik, words: BlockWordValues) -> bool:
 
 
 def choose_edge(control: Sinumerik, words: BlockWordValues) -> bool:
-    """D: the cutting edge in force; False where that is not known."""
+    """Execute D, which selects the cutting edge; False if it is known only at run time."""
     value = words.values["D"]
     if value is None:
         control.refuse_rest("the cutting edge (D) is known only at run time")
@@ -250,7 +251,7 @@ def choose_edge(control: Sinumerik, words: BlockWordValues) -> bool:
 
 
 def into_spindle(control: Sinumerik) -> None:
-    """The tool that is selected comes into the spindle, with its edge D1."""
+    """Change to the selected tool, with its edge D1."""
     control.resume("tool")
     control.tools.change()
     control.edge = 1
@@ -258,7 +259,7 @@ def into_spindle(control: Sinumerik) -> None:
 
 
 def take_up(control: Sinumerik) -> None:
-    """The program moves before it has called a tool or an edge: that in the spindle is in force, with its edge D1."""
+    """At a motion before any tool or edge was called: take the tool in the spindle, with its edge D1, into force."""
     if not control.at_start:
         return
     control.at_start = False
@@ -272,7 +273,7 @@ def take_up(control: Sinumerik) -> None:
 
 
 def set_length(control: Sinumerik) -> None:
-    """The length of the tool in force, across the plane: the position stays, its name changes."""
+    """Take the length of the active tool into force, across the plane; the axes stay, the program position changes."""
     if control.at_start:
         return
     number, edge = control.tools.spindle, control.edge

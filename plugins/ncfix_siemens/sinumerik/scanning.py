@@ -1,9 +1,7 @@
-"""The shapes of a text's blocks in SINUMERIK: where its numbers would be, without understanding it.
+"""The scanner of SINUMERIK texts: numbers and shape of every block without parsing; also renumbering and polar words.
 
-A digit inside a name belongs to the name, and so does the number of an extended address (`C1=`): they are part of the
-shape. The reader compares with the grammar for every shape, and goes by the grammar where the two differ.
-
-Besides: block numbers, all anew; and programs in which a block has only one of AP and RP.
+Digits inside a name belong to the name, and the number of an extended address (`C1=`) to the address: they are part of
+the shape. The reader compares each shape with the grammar, and uses the grammar if the two differ.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ from ncfix.text.tree import Program, Template
 from ncfix_siemens.sinumerik.vocabulary import POLAR, POLES
 
 FIXED = table(b"GgMmRr")
-"""A number after these is no value but says which code or parameter it is."""
+"""Letters after which a number is a code or a parameter, not a value."""
 
 LETTERS = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
 LETTER, ADDRESS = table(LETTERS), table(LETTERS[:-2])
@@ -32,10 +30,10 @@ DIGIT = table(DIGITS)
 NAMES = table(LETTERS + DIGITS)
 
 PASSIVE = re.compile(rb'"[^"\r\n]*"|(?P<comment>;[^\r\n]*)')
-"""Strings and comments: there are no numbers in them."""
+"""Strings and comments, whose digits are no numbers."""
 
 PATH = re.compile(rb"(?im)^[ \t]*;[ \t]*\$PATH[ \t]*=")
-"""The line of an archive that says where a program belongs: no comment, though it looks like one."""
+"""The path line of an archive, which looks like a comment but is none."""
 
 
 def scan(source: bytes, blocks: Ints) -> Scan:
@@ -44,7 +42,7 @@ def scan(source: bytes, blocks: Ints) -> Scan:
 
 
 def scan_slice(source: bytes, blocks: Ints) -> Scan:
-    """As `scan`, of so much that its columns do not take much room."""
+    """As `scan`, for a slice of the text, to limit memory."""
     text = np.frombuffer(source, dtype=np.uint8)
     passive = list(matches(PASSIVE, source, b';"'))
     quiet = np.array([match.span() for match in passive], dtype=np.int64).reshape(-1, 2)
@@ -59,7 +57,7 @@ def scan_slice(source: bytes, blocks: Ints) -> Scan:
 
 
 def in_names(text: Bytes, source: bytes) -> Mask:
-    """(n,) the digits that belong to a name of two letters or more, or to an extended address."""
+    """Mask (n,) of the bytes that belong to a name of two letters or more, or to the number of an extended address."""
     words = runs_of(NAMES[text])
     start = words[:, 0]
     second = text[np.minimum(start + 1, len(text) - 1)]
@@ -74,13 +72,13 @@ def in_names(text: Bytes, source: bytes) -> Mask:
 
 
 def extended_by_one(text: Bytes, places: Ints) -> Mask:
-    """(n,) the equals signs right behind an address of one letter and one digit, as in ` A3=`."""
+    """Mask (n,) of the equals signs directly after an address of one letter and one digit, as in ` A3=`."""
     digit, letter, before = (text[np.maximum(places - back, 0)] for back in (1, 2, 3))
     return (places > 2) & DIGIT[digit] & ADDRESS[letter] & ~LETTER[before]
 
 
 def extension(source: bytes, place: int) -> tuple[int, int]:
-    """Where the number of an extended address stands before an equals sign at `place`; nowhere if it is none."""
+    """Start and stop of the number of an extended address before an equals sign at `place`; empty if it is none."""
     stop = place
     while stop and source[stop - 1] in BLANKS:
         stop -= 1
@@ -99,7 +97,7 @@ BLOCK = re.compile(
     re.IGNORECASE | re.DOTALL,
 )
 WORDS = re.compile(r"[A-Z][ \t]*[-+=.\d]", re.IGNORECASE)
-"""How a block begins that is nothing but words, as those are that are put in."""
+"""The beginning of a block of words, such as inserted blocks."""
 
 LABEL = re.compile(r"[A-Z_]\w*[ \t]*:(?!=)", re.IGNORECASE)
 HEAD = re.compile(r"[ \t]*%")
@@ -107,20 +105,20 @@ SILENT = re.compile(r'"[^"]*"|;.*', re.DOTALL)
 JUMP = re.compile(r"\b(?:GOTO[FBC]?|REPEATB?)[ \t]+(?P<where>N[ \t]*\d+(?:[ \t]+N[ \t]*\d+)?)(?!\w)", re.IGNORECASE)
 NUMBER = re.compile(r"N[ \t]*(\d+)", re.IGNORECASE)
 BY_TEXT = re.compile(r'"[ \t]*N[ \t]*\d*[ \t]*"', re.IGNORECASE)
-"""A block number, or the beginning of one, as a text: the target of a jump may be made of it."""
+"""A string that is a block number or its beginning, from which the target of a jump may be composed."""
 
 
 def renumbered(source: bytes) -> bytes:
-    """A program with its blocks numbered 10, 20, ... wherever they have numbers, and blocks of words where others have.
+    """A program with its blocks renumbered 10, 20, ...; in numbered programs, inserted blocks of words get numbers.
 
-    Raises RefusedError NCF256 where a jump goes to a number that stands twice, or that is put together at run time.
+    Raises `RefusedError` NCF256 if a jump goes to a number that occurs twice, or that is composed at run time.
     """
     lines = source.decode("latin-1").splitlines(keepends=True)
     return "".join(line for unit in units(lines) for line in numbered(unit)).encode("latin-1")
 
 
 def units(lines: list[str]) -> Iterator[list[str]]:
-    """The programs of an archive."""
+    """The lines of each program of an archive."""
     heads = [place for place, line in enumerate(lines) if HEAD.match(line)]
     edges = sorted({0, *heads, len(lines)})
     for begin, end in pairwise(edges):
@@ -128,7 +126,7 @@ def units(lines: list[str]) -> Iterator[list[str]]:
 
 
 def numbered(lines: list[str]) -> list[str]:
-    """The lines of one program."""
+    """The lines of one program, renumbered."""
     blocks = [BLOCK.fullmatch(line) for line in lines]
     old = [int(block["number"]) for block in blocks if block is not None and block["number"]]
     if not old:
@@ -149,7 +147,7 @@ def numbered(lines: list[str]) -> list[str]:
 
 
 def redirected(line: str, new: dict[int, int], old: list[int]) -> str:
-    """A line whose jumps go to the new numbers."""
+    """A line with its jumps redirected to the new numbers."""
     if BY_TEXT.search(line.split(";")[0]):
         raise RefusedError.of(NOT_NUMBERED, f"a jump may go to a number that is a text: {line.strip()[:40]}")
     code = SILENT.sub(lambda found: " " * len(found[0]), line)
@@ -163,7 +161,7 @@ def redirected(line: str, new: dict[int, int], old: list[int]) -> str:
 
 
 def targets(code: str) -> list[tuple[tuple[int, int], int]]:
-    """Where block numbers stand that a line leads to, and what they are."""
+    """Span and value of each block number that is the target of a jump in a line."""
     return [
         (number.span(1), int(number[1]))
         for jump in JUMP.finditer(code)
@@ -175,19 +173,19 @@ ALL_OR_NONE = "polar coordinates of which only one is written, where another blo
 
 
 def polar_words(template: Template) -> frozenset[str]:
-    """The polar words of a motion: AP, RP."""
+    """The polar words (AP, RP) of a motion block; none for a block that sets the pole."""
     if not POLES.isdisjoint(template.g_codes):
         return frozenset()
     return frozenset(word.address for word in template.words) & POLAR
 
 
 def has_partial(program: Program) -> bool:
-    """Whether a block relies on a polar word that was written before."""
+    """Whether a block of the program has only one of AP and RP, and so uses the other of an earlier block."""
     return any(len(polar_words(template)) == 1 for template in program.templates)
 
 
 def all_or_none(moves: Moves, program: Program) -> Moves:
-    """The motions, with all that have polar words refused where one of them cannot be corrected."""
+    """The motions; if polar words depend on earlier blocks and one such motion cannot be corrected, all are refused."""
     if not has_partial(program):
         return moves
     shapes = [index for index, template in enumerate(program.templates) if polar_words(template)]

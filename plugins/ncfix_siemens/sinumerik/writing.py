@@ -1,11 +1,11 @@
-"""What SINUMERIK adds to the writer of blocks: polar words, senses of rotation, CIP, and calls of cycles.
+"""The writer of SINUMERIK blocks: polar words, senses of rotation, CIP and cycle calls; and the layout of a block.
 
-The call of a hole's cycle with a depth of its own goes in before the motion, in the same place of the flow: number and
-label of the block stay before it. Behind the hole the call of the program comes back, so what is executed next finds
-the depth that it knew. A cycle that is called where the axes stand, and shall drill a little beside, becomes a modal
-one for the motion to there. A milling cycle that names its place gets other arguments.
+A hole with a corrected depth gets its own modal cycle call before its motion, behind number and label of the block.
+After the hole the original call is restored, so that later holes have their depth. A cycle called where the axes stand,
+but corrected sideways, becomes a modal call with a motion to the corrected place. A milling cycle that names its place
+gets other arguments.
 
-Where things stand in a motion block of SINUMERIK: which words may be rewritten, and where a missing one goes.
+`SinumerikLayout` tells which words of a motion block may be rewritten, and where a missing word is inserted.
 """
 
 from __future__ import annotations
@@ -70,9 +70,9 @@ from ncfix_siemens.sinumerik.vocabulary import (
 SPELLING = Spelling(vector=tuple(f"{address}=" for address in VECTOR), vector_digits=7)
 BARE = Spelling(point=False)
 OTHER_DECIMALS = 5
-"""Of words that are no axes."""
+"""Decimals of words that are no axes."""
 ARGUMENT_DECIMALS = 9
-"""Of arguments that stay: a computed depth, written again, is the same one."""
+"""Decimals of unchanged arguments, enough to reproduce a computed depth."""
 
 CIP = MOTIONS["cip"]
 ARCS = frozenset({20, 30})
@@ -87,7 +87,7 @@ END_OF_SUBPROGRAM = frozenset({17.0})
 
 
 class SinumerikWriter(BlockWriter):
-    """Writes one motion into one block, or one hole. `across`: the column along which that is drilled, else -1."""
+    """Writes one motion or hole into one block. across: column of the drilling axis of a hole, else -1."""
 
     layout: SinumerikLayout
 
@@ -96,7 +96,7 @@ class SinumerikWriter(BlockWriter):
     ) -> None:
         super().__init__(program, block, layout, target, spelling)
         self.across = -1 if target.call is None else target.letters.index(target.call.across)
-        if target.call is not None:  # a word along the tool says where it goes before it drills, and stays
+        if target.call is not None:  # a word along the drilling axis is the approach height, and stays
             self.columns = [each for each in self.columns if each[0] != self.across]
 
     def _write(self) -> None:
@@ -127,17 +127,17 @@ class SinumerikWriter(BlockWriter):
         return len(self.target.ends) == 1 and bool(near[self._polar_columns()].all())
 
     def _polar_columns(self) -> Mask:
-        """The columns that no word of the block names while it has polar coordinates."""
+        """Mask of the X, Y, Z columns without a word in a block with polar coordinates."""
         free = [column for column, letter in self.columns if letter in "XYZ" and letter not in self.layout.axes]
         return np.isin(np.arange(len(self.half)), free)
 
     def _meant(self, column: int, word: Word, *, increment: bool) -> float:
-        """A formula in IC always gives way to a number."""
+        """As of every writer; a formula in IC is always replaced by a number (NaN: not kept)."""
         formed = self.layout.forms.get(word.address) == INCREMENTAL
         return math.nan if formed else super()._meant(column, word, increment=increment)
 
     def _arrive(self, position: Array, column: int, start: float, end: float, word: Word) -> None:
-        """IC instead of DC, ACP or ACN, where that would lead a rotary axis the other way round."""
+        """Write IC instead of DC, ACP or ACN if these would turn a rotary axis the other way."""
         form = self.layout.forms.get(word.address, "")
         if form not in TURNING:
             return
@@ -178,7 +178,7 @@ class SinumerikWriter(BlockWriter):
         return not other and super()._has_centre()
 
     def _via(self, start: Array, end: Array) -> None:
-        """The intermediate point of CIP, moved as the ends are."""
+        """Write the intermediate point of CIP, shifted like the ends in proportion to its distance from them."""
         target, words = self.target, self.layout.via
         begin, finish = self._xyz(start), self._xyz(end)
         nominal_end, via = self._xyz(target.nominal), target.origin.copy()
@@ -197,7 +197,7 @@ class SinumerikWriter(BlockWriter):
         self.out.centre = np.array(circle.centre)
 
     def _via_word(self, address: str, index: int, wanted: float, begin: float) -> float:
-        """One word of the intermediate point; what the control will read."""
+        """Write one word of the intermediate point; returns the value that the control will read."""
         column, word = self.target.spatial[index], self.layout.via.get(address)
         digits, half = int(self.target.decimals[column]), self.half[column]
         base = begin if (self.incremental if word is None else self._is_incremental(word)) else 0.0
@@ -218,7 +218,7 @@ class SinumerikWriter(BlockWriter):
     # -- holes --------------------------------------------------------------------------------------------------------
 
     def _hole(self, call: CycleCall) -> None:
-        """A hole: the words that lead over it, and a call of its cycle with a depth of its own."""
+        """Write a hole: the words that lead to it, and a cycle call with a corrected depth."""
         across, target = self.across, self.target
         off = float(target.ends[0][across] - target.nominal[across])
         if abs(off) < self.half[across]:
@@ -234,7 +234,7 @@ class SinumerikWriter(BlockWriter):
         self.out.ends.append(position)
 
     def _placed(self, call: CycleCall, arguments: list[str] | None) -> Array:
-        """At a place that the call names: the arguments that say so and how deep."""
+        """Write a cycle that names its place: the arguments of place and depth."""
         target, position = self.target, self.target.start.copy()
         for column in map(target.letters.index, call.led):
             position[column] = target.ends[0][column]
@@ -254,7 +254,7 @@ class SinumerikWriter(BlockWriter):
         return position
 
     def _led_to(self, call: CycleCall, arguments: list[str] | None) -> Array:
-        """Behind a motion that leads to it: the words of the motion, and the call before and behind it."""
+        """Write a hole of a modal cycle: the words of the motion, with a corrected call before and the original after."""
         if arguments is not None:
             self._check(call)
             at, line_end = self.program.position(self.block, self.layout.begins), self.program.line_end.decode()
@@ -265,14 +265,15 @@ class SinumerikWriter(BlockWriter):
         return self._first_piece(self.target.start.copy(), self.target.ends[0])
 
     def _check(self, call: CycleCall) -> None:
-        """Whether lines may be put before and behind the block."""
+        """Set a conflict if no lines may be inserted before and after the block."""
         codes = (self._value(word, np.nan) for word in self.layout.after)
         ends = ENDS_HERE if END_OF_SUBPROGRAM.intersection(codes) else ""
         self.out.conflict = self.out.conflict or call.fixed or ends
 
     def _is_inside_out(self, call: CycleCall, sunk: float) -> bool:
-        """Whether the hole would end on the other side of the height that its cycle counts from; where that moves with
-        it, whether it would rise above that at which the cycle ends."""
+        """Whether a hole sunk by `sunk` would end on the other side of the reference plane (RFP); or, if RFP moves with
+        it, whether it would rise above the retraction plane (RTP).
+        """
         first = int(bool(call.led))  # behind the name of a contour
         if (first + RFP, 1) in call.depths:
             clear, start, gap = (number_of(call, first + place) for place in (RTP, RFP, SDIS))
@@ -282,7 +283,7 @@ class SinumerikWriter(BlockWriter):
         return isinstance(reference, float) and (nominal - reference) * (nominal + sunk - reference) <= 0.0
 
     def _called(self, call: CycleCall, arguments: list[str] | None) -> Array:
-        """Where the axes stand: the call itself, modal for a motion of its own where the hole is beside that place."""
+        """Write a cycle called where the axes stand; if the hole is shifted, a modal call and a motion of its own."""
         target, position = self.target, self.target.start.copy()
         for column, _ in self.columns:
             if self._may_add(column):
@@ -308,9 +309,9 @@ class SinumerikWriter(BlockWriter):
 
 
 def shifted(call: CycleCall, off: float, decimals: int) -> tuple[list[str] | None, float]:
-    """The arguments of a call whose hole ends `off` higher, as written, and by how much it then does.
+    """The arguments, as text, of a call whose hole ends higher by `off`; and the exact shift after rounding.
 
-    None where that changes nothing.
+    (None, 0.0) if nothing changes.
     """
     (first, sense), *_ = call.depths
     value = number_of(call, first)
@@ -325,7 +326,7 @@ def shifted(call: CycleCall, off: float, decimals: int) -> tuple[list[str] | Non
 
 
 def argument(value: float | str | None) -> str:
-    """An argument as it is written."""
+    """The text of an argument."""
     if value is None:
         return ""
     return f'"{value}"' if isinstance(value, str) else BARE.short(value, ARGUMENT_DECIMALS)
@@ -339,7 +340,7 @@ def number_of(call: CycleCall, place: int) -> float:
 
 
 def with_arguments(text: str, changed: Mapping[int, str]) -> str:
-    """A call as the program writes it, with some other arguments (place -> number), in the style of its own numbers."""
+    """The text of a call with some arguments replaced (index -> number), in the style of its own numbers."""
     found = CYCLE.fullmatch(text)
     assert found is not None
     parts = in_parts(found["arguments"])
@@ -354,7 +355,7 @@ def with_arguments(text: str, changed: Mapping[int, str]) -> str:
 
 
 def in_parts(text: str) -> list[str]:
-    """Arguments as written, parted at the commas that stand in no brackets and no text."""
+    """The text of arguments, split at commas outside brackets and quotes."""
     parts, depth, quoted = [""], 0, False
     for letter in text:
         quoted ^= letter == '"'
@@ -374,13 +375,13 @@ def in_parts(text: str) -> list[str]:
 class SinumerikLayout(Layout):
     """The writable parts of a motion block.
 
-    formed  the values of words with a form, brackets and all
+    formed  address -> span of the whole value of a word with a form, such as `IC(10)`
     via     I1 J1 K1 by address
-    angle   AR
+    angle   the word AR
     polar   AP and RP by address
-    partial_polar  blocks of the program rely on such a word of a block before
-    cycle   the call of a drilling or milling cycle, where the block holds nothing else
-    begins  where its words begin, behind block skip, number and label
+    partial_polar  some blocks of the program use AP or RP of an earlier block
+    cycle   span of the call of a drilling or milling cycle, if the block holds nothing else
+    begins  start of its words, after block skip, number and label
     """
 
     formed: dict[str, Span]
@@ -393,12 +394,12 @@ class SinumerikLayout(Layout):
 
     @property
     def points(self) -> bool:
-        """Whether the block says which way the tool points."""
+        """Whether the block gives the direction of the tool by a vector or angles."""
         return bool(self.vector or self.angles)
 
 
 def layout_of(program: Program, block: int) -> SinumerikLayout | None:
-    """The layout of a motion block; None for control structures, calls, and what is not understood."""
+    """The layout of a motion block; None for control structures, calls, and blocks not understood."""
     words = BlockWords(program, block)
     cycle = drilling_call(words)
     if cycle is None and not all(
@@ -444,12 +445,12 @@ def layout_of(program: Program, block: int) -> SinumerikLayout | None:
 
 
 def form_of(word: Word) -> str:
-    """How a word is meant, if it says so: `ac`, `ic`, `dc`, ..."""
+    """The form of a word, `ac`, `ic`, `dc`, ...; "" if it has none."""
     return word.value.name if isinstance(word.value, FunctionCall) and word.value.name in FORMS else ""
 
 
 def without_form(program: Program, block: int, word: Word) -> Word:
-    """A word whose value is what stands in the brackets of its form: `X=IC(10)` as `X=10`."""
+    """A word with the value inside the brackets of its form: `X=IC(10)` as `X=10`."""
     start, stop = program.span(block, word.value_span)
     found = FORM.match(program.source[start:stop].decode("latin-1")) if form_of(word) else None
     if found is None or not isinstance(word.value, FunctionCall):
@@ -461,7 +462,7 @@ def without_form(program: Program, block: int, word: Word) -> Word:
 
 
 def drilling_call(words: BlockWords) -> Span | None:
-    """The call of a drilling or milling cycle, if that is all that a block holds besides its number."""
+    """Span of the call of a drilling or milling cycle, if the block holds nothing else but number and comment."""
     items = [item for item in words.items if not (is_prefix(item) or isinstance(item, Comment))]
     match items:
         case [Command(name) as call] if name in DRILLING or name in MILLING:
@@ -476,12 +477,12 @@ def is_prefix(item: Item) -> bool:
 
 
 def is_quiet(item: Command) -> bool:
-    """Whether a name in the block neither calls anything nor changes coordinates."""
+    """Whether a name neither calls a program nor changes coordinates."""
     return item.name in HARMLESS | {"cycle832"} or item.name in MOTIONS or item.name.startswith("ori")
 
 
 def may_stay(item: object) -> bool:
-    """Whether lines may be put after a block with this item."""
+    """Whether a block with this item may be rewritten."""
     if isinstance(item, OWordLine):
         return item.keyword == "label"
     return not isinstance(item, (Command, Opaque, Tape))
