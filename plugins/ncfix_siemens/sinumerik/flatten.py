@@ -1,8 +1,8 @@
-"""Blocks of SINUMERIK written down as they are executed, for a flat program.
+"""Flat SINUMERIK programs: blocks are written as they are executed.
 
-A block goes out as it stands, without its number and labels. Expressions give way to their values; definitions,
-assignments to what they define, control structures, calls of subprograms and their heads fall away. What others may
-read, R parameters, global data and those of the control, is set as it was.
+A block is written unchanged but without number and labels. Expressions are replaced by their values. Definitions,
+assignments to defined variables, control structures, calls of subprograms and their heads are dropped. R parameters,
+global data and data of the control, which others may read, are still assigned.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from ncfix_siemens.sinumerik.vocabulary import FORM, FORMS, HARMLESS
 from ncfix_siemens.sinumerik.writing import BARE, OTHER_DECIMALS, argument
 
 MORE_DECIMALS = 2
-"""More than the least increment needs, so that increments do not add up to one."""
+"""Decimals beyond the least increment, so that rounding errors of increments do not add up to one."""
 
 ENDS = frozenset({2.0, 17.0, 30.0})
 """M codes with which a subprogram ends."""
@@ -46,7 +46,7 @@ ENDS = frozenset({2.0, 17.0, 30.0})
 class SinumerikFlattener(Flattener):
     """See `Flattener`.
 
-    turn  the block as it is executed; `main`: no subprogram is
+    turn  the execution of the current block; main: it is in the main program
     """
 
     turn: Turn
@@ -57,7 +57,7 @@ class SinumerikFlattener(Flattener):
         self.control = control
 
     def record(self, unit: SinumerikUnit, block: int, turn: Turn, *, main: bool) -> None:
-        """Write a block down as it is executed."""
+        """Write a block that is being executed."""
         self.watch(unit, block)
         self.turn, self.main = turn, main
         text = self.text(self.changes()).strip()
@@ -68,12 +68,12 @@ class SinumerikFlattener(Flattener):
         self.control.pattern = ()
 
     def opaque(self, item: Opaque) -> Change | None:
-        """Heads of subprograms fall away."""
+        """The change of a head: those of subprograms are dropped."""
         leads = item.kind in ("program head", "external") and (not self.main or self.turn.plan.steps)
         return self.dropped(item) if leads else None
 
     def word(self, word: Word) -> Change | None:
-        """What becomes of a word."""
+        """The change of a word; None: it stays."""
         turn = self.turn
         repeats = any(getattr(step, "keyword", "").startswith("repeat") for step in turn.plan.steps)
         dropped = word.address in ("N", ":") or (word.address == "P" and (turn.subprogram is not None or repeats))
@@ -84,7 +84,7 @@ class SinumerikFlattener(Flattener):
         return None if is_plain(word.value) else self.replaced(word.value_span, self.number(word))
 
     def assignment(self, item: Assignment) -> Change | None:
-        """What becomes of an assignment; the block has been executed, so the variable has its value already."""
+        """The change of an assignment, whose variable already has its new value; None: it stays."""
         step = next(
             step for step in self.turn.plan.steps if isinstance(step, AssignedVariable) and step.span == item.span
         )
@@ -104,13 +104,13 @@ class SinumerikFlattener(Flattener):
         return self.replaced(item.span, f"{self.target(step.name, known)}={assigned(value)}")
 
     def target(self, name: str, places: tuple[float, ...]) -> str:
-        """What gets a value, as it is written."""
+        """The text of the target of an assignment."""
         if name == "r":
             return f"R{places[0]:.0f}"
         return name.upper() + (f"[{','.join(BARE.short(place, 0) for place in places)}]" if places else "")
 
     def number(self, word: Word) -> str:
-        """The value of a computed word as it is written, within its brackets if it has a form."""
+        """The text of a computed word's value, within the brackets of its form if it has one."""
         words, text = self.turn.words, self.unit.program.slice(self.block, word.value_span)
         if word.address in words.texts:
             return f'"{words.texts[word.address]}"'
@@ -124,7 +124,7 @@ class SinumerikFlattener(Flattener):
         return shown if found is None else text[: found.start("value")] + shown + text[found.end("value") :]
 
     def place(self, point: tuple[float, float]) -> str:
-        """The rapid to a place of a pattern of holes."""
+        """The rapid motion to a place of a pattern of holes."""
         plane = self.control.modal.plane
         letters = plane.of(LETTERS)
         digits = [decimals_for(self.steps[letter]) + MORE_DECIMALS for letter in letters]
@@ -132,7 +132,7 @@ class SinumerikFlattener(Flattener):
         return " ".join(["G0", *(f"{letter}{BARE.short(value, places)}" for letter, value, places in words)])
 
     def command(self, command: Command) -> Change | None:
-        """What becomes of a name."""
+        """The change of a name; None: it stays."""
         turn, scope = self.turn, self.control
         if command.name in ("def", "ret") or (turn.called is not None and turn.called.span == command.span):
             return self.dropped(command)
@@ -152,8 +152,9 @@ class SinumerikFlattener(Flattener):
         raise Fault(RUNTIME, f"an argument of {command.name.upper()} is known only at run time")
 
     def given(self, value: Value, written: Expression) -> str | None:
-        """An argument as it is written: a name that the program has not defined is the control's (_ORI_FINISH), and
-        stays; None where its value is known only at run time."""
+        """The text of an argument. A name that the program has not defined belongs to the control (_ORI_FINISH) and
+        stays; None if the value is known only at run time.
+        """
         if not isinstance(value, Unknown):
             return argument(value)
         if isinstance(written, NamedParameter) and self.control.variables.scope_of(written.name) is None:
@@ -162,7 +163,7 @@ class SinumerikFlattener(Flattener):
 
 
 def is_plain(value: Expression) -> bool:
-    """Whether a value is written as a number or text, in brackets perhaps."""
+    """Whether a value is a plain number or text, perhaps with sign or form."""
     match value:
         case Literal() | Constant() | StringLiteral():
             return True
@@ -174,7 +175,7 @@ def is_plain(value: Expression) -> bool:
 
 
 def indices(target: NumberedParameter | NamedParameter | FunctionCall) -> tuple[Expression | None, ...]:
-    """The indices of what gets a value."""
+    """The indices of the target of an assignment."""
     match target:
         case NumberedParameter(index):
             return (index,)
@@ -184,10 +185,10 @@ def indices(target: NumberedParameter | NamedParameter | FunctionCall) -> tuple[
 
 
 def is_index(value: Expression | None) -> bool:
-    """Whether an index is written as it is: a number, or a name, as that of an axis."""
+    """Whether an index needs no evaluation: a number, or a name such as that of an axis."""
     return value is not None and (is_plain(value) or isinstance(value, NamedParameter))
 
 
 def assigned(value: float | str) -> str:
-    """A value that a variable gets, to all digits."""
+    """The text of an assigned value, with all digits."""
     return f'"{value}"' if isinstance(value, str) else f"{value:.15g}".replace("e", "EX")

@@ -1,7 +1,7 @@
-"""The walk through a program of SINUMERIK: block after block, as control structures and calls lead.
+"""The interpreter of SINUMERIK programs, block by block as control structures and calls lead.
 
-What the run decides stands here, too: assignments to axes that move by themselves, to probing and to data of the
-control; branches that need not be followed, and what is refused behind all others.
+Also here: assignments to axes that move by themselves, to probing and to data of the control; branches decided at run
+time, which are skipped if they do not matter, or after which all motions are refused.
 """
 
 from __future__ import annotations
@@ -69,25 +69,25 @@ if TYPE_CHECKING:
 NOT_UNDERSTOOD = "NCF250"
 SYNCHRONOUS = "NCF251"
 MAIN = frozenset({"", "MPF"})
-"""The kinds of programs that are begun by themselves; SPF are called, and CYC and INI are none."""
+"""Kinds of main programs; SPF are subprograms, CYC and INI no programs to follow."""
 CONTOUR = "the contour that {} mills has to stay what it is, and cannot be written out flat"
 PROGRAM_ENDS = frozenset({20, 300, 170})
 TOOL_CHANGE = re.compile(rb"(?im)^[^;\n]*(?<![A-Z0-9_])M[ \t]*=[ \t]*0*6(?![\d.])")
 PERHAPS = re.compile(rb"[Mm][ \t]*=[ \t]*0*6")
-"""What `TOOL_CHANGE` finds has this in it, which is found sooner."""
+"""A part of every match of `TOOL_CHANGE`, whose search is faster."""
 
 AFTER_POSITIONING = "where the axis {} stands after it was positioned by itself is not followed"
 POLYNOMIAL, POLYNOMIALS = "po", UNFOLLOWED_MOTIONS[MOTIONS["poly"]]
 GO_SOMEWHERE = frozenset({"pos", "posa", "posp", "ax"})
 DESELECTED = frozenset({"tcarr", "cutmod"})
-"""Names of which zero takes out of force what is refused where another number brings it into force."""
+"""Names whose value zero deactivates what other values activate; activation is refused."""
 
 BY_THEMSELVES = frozenset(ASYNCHRONOUS) | GO_SOMEWHERE | {POLYNOMIAL}
-"""What with an axis as index lets it move on its own, `POS[X]=100`, or says where it goes, `PO[X]=(10,2)`."""
+"""Names that, with an axis as index, move it by itself, `POS[X]=100`, or give its end, `PO[X]=(10,2)`."""
 
 
 def changes_tools(plans: Iterable[SinumerikPlan], source: bytes) -> bool:
-    """Whether a text has an M6, so that T by itself changes no tool."""
+    """Whether a text has an M6, so that T alone does not change the tool."""
     return any(60 in plan.m for plan in plans) or bool(PERHAPS.search(source) and TOOL_CHANGE.search(source))
 
 
@@ -99,11 +99,11 @@ def begins_a_program(unit: SinumerikUnit) -> bool:
 
 
 class SinumerikInterpreter(Interpreter[SinumerikUnit]):
-    """Follows one program.
+    """The interpreter of one program.
 
-    main     the program that is followed: the first of the text, or of an archive the first that is no subprogram
-    at_once  T by itself changes the tool; `called`: one has been called
-    again    stretches of blocks that may be executed again after a branch that is decided at run time, and `why` it is
+    main     the program that is followed: the first main program of the text; others: its other programs
+    at_once  T alone changes the tool; called: a tool has been called
+    again    stretches of blocks that may be executed again after a branch decided at run time; why: its reason
     """
 
     control: Sinumerik
@@ -128,12 +128,12 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             control.variables.scopes[0].kinds[parameter.name] = ""
 
     def place(self) -> Place:
-        """Where in the program we are."""
+        """The place of the current block in its program."""
         unit, block = self.flow.unit, self.flow.block - 1
         return unit.program.place(max(block, unit.begin), self.span)
 
     def find(self, name: str) -> SinumerikUnit | None:
-        """A subprogram: in this text, or in a file of its own."""
+        """The subprogram `name`, in this text or in a file of its own; None if there is none."""
         key = name.upper()
         self.files[key] = found = self.files[key] if key in self.files else super().find(name)
         return found
@@ -172,7 +172,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             self.at_once = False
 
     def walk(self) -> bool:
-        """See `Interpreter`; what follows a branch that is decided at run time is refused."""
+        """See `Interpreter`; after a branch decided at run time all motions are refused."""
         try:
             return super().walk()
         except AtRuntimeError:
@@ -192,7 +192,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         return all_or_none(moves, self.main.program)
 
     def run_lane(self, unit: SinumerikUnit, block: int, plan: SinumerikPlan) -> int:
-        """See `Interpreter`; blocks that point the tool go in a lane of their own."""
+        """See `Interpreter`; blocks with tool vectors have a lane of their own."""
         if plan.vector is not None:
             return run_vectors(self.control, unit, block, not unit.external)
         control, first = self.control, self.control.builder.count
@@ -219,7 +219,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         )
 
     def note_stretch(self, unit: SinumerikUnit, block: int, done: int) -> None:
-        """See `Interpreter`: the axes that these blocks have named have been brought somewhere."""
+        """See `Interpreter`: increments of the axes named in these blocks now count from the frames in force."""
         control = self.control
         control.fresh_tool = False
         if control.counted != control.footing:
@@ -234,7 +234,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
     # -- one block ----------------------------------------------------------------------------------------------------
 
     def execute(self, plan: SinumerikPlan, unit: SinumerikUnit, block: int) -> bool:
-        """Execute a block; True if the program ends there."""
+        """Execute a block; whether the program ends there."""
         control, flow = self.control, self.flow
         if plan.opaque:
             self.opaque(plan, unit.program.text_of(block))
@@ -267,7 +267,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         return self.go_on(plan, turn, unit, block)
 
     def go_on(self, plan: SinumerikPlan, turn: Turn, unit: SinumerikUnit, block: int) -> bool:
-        """Where the block leads: into a subprogram, to the end, by a jump, or on. True if the program ends."""
+        """Continue after a block: into a subprogram, by a jump, or with the next block. Whether the program ends."""
         flow, called = self.flow, turn.subprogram
         if called is not None:
             flow.follow((Call(lambda: flow.called(called, turn.arguments, turn.written, turn.times)),))
@@ -301,7 +301,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         return flow.ended
 
     def opaque(self, plan: SinumerikPlan, text: str) -> None:
-        """Text that is no motion, or that nobody understands."""
+        """Execute text that is not parsed: a block not understood, a macro, a synchronized action."""
         control = self.control
         if is_statement(plan) or "macro" in plan.opaque:
             why = f"the block {say(text)} is not understood, and may move axes or change coordinates"
@@ -315,7 +315,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             control.warn(SYNCHRONOUS, control.refusal, "all motions after it are refused")
 
     def evaluate(self, plan: SinumerikPlan, index: int) -> BlockWordValues:
-        """The values of the words of a block."""
+        """Evaluate the words of a block."""
         values: dict[str, float | None] = {}
         texts: dict[str, str] = {}
         forms: dict[str, str] = {}
@@ -338,7 +338,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
 
 
 def let_axis_go(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None:
-    """POS[X]=.. and its like: an axis that moves by itself; where it arrives is not followed."""
+    """Execute `POS[X]=..` and the like: an axis moves by itself, and its end position is not followed."""
     name = step.index[0](control) if step.index else None
     known = isinstance(name, str) and name in INDEX and INDEX[name] in control.axis_indices
     if step.name == POLYNOMIAL:
@@ -357,7 +357,7 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None:
 
 
 def follow_polynomial(control: Sinumerik, turn: Turn, step: AssignedVariable, letter: str | None) -> None:
-    """PO[X]=(end, a2, a3): the axis ends where the first number says; without one, or for an angle, nobody knows."""
+    """Execute `PO[X]=(end, a2, a3)`: the motion is refused, the axis ends at the first number if that is known."""
     first = next(iter(step.listed), step.value)
     value = first(control) if first is not None and letter is not None else None
     letters = LETTERS if letter is None else letter
@@ -368,7 +368,7 @@ def follow_polynomial(control: Sinumerik, turn: Turn, step: AssignedVariable, le
 
 
 def note_letting(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None:
-    """A name that gets a value and is no variable, or one with which the control changes."""
+    """Note an assignment that is not to a variable of the program, or that changes the control itself."""
     if step.name in DESELECTED and step.value is not None and step.value(control) == 0.0:
         return
     if OF_THE_CONTROL.match(step.name):
@@ -389,7 +389,7 @@ MACHINE = frozenset({530, 1530})
 
 
 def decided_at_runtime(flow: SinumerikFlow) -> str:
-    """Why nobody can say where the program goes on: the variables of its branch that are not known."""
+    """Why the next block is undecided, naming the unknown variables of the branch."""
     conditions = (part for step in flow.unit.branchings(flow.block - 1) for part in step.written)
     named = dict.fromkeys(name for part in conditions for name in names_in(part))
     unknown = [name.upper() for name in named if not has_value(flow.control.variables, name)]
@@ -397,9 +397,9 @@ def decided_at_runtime(flow: SinumerikFlow) -> str:
 
 
 def sweep(flow: SinumerikFlow, others: Sequence[SinumerikUnit], why: str) -> list[tuple[int, int]]:
-    """Refuse the motions of all that is left, the programs of the text that it may call included.
+    """Refuse the motions of all remaining blocks, and of the programs of the text that they may call.
 
-    Returns the stretches of blocks that it may execute again.
+    Returns the stretches of blocks that may be executed again.
     """
     control = flow.control
     control.refuse_rest(why)
@@ -418,7 +418,7 @@ NAME_IN_TEXT, NAMED_BY_TEXT = re.compile(r"\w+"), frozenset({"CALL", "PCALL", "E
 
 
 def callable_from(places: Iterable[tuple[SinumerikUnit, int]], others: Iterable[SinumerikUnit]) -> list[SinumerikUnit]:
-    """The programs among `others` that blocks from these places on may call, directly or by one another."""
+    """The programs among `others` that blocks from these places on may call, directly or indirectly."""
     found: list[SinumerikUnit] = []
     pending = list(places)
     while pending:
@@ -432,7 +432,7 @@ def callable_from(places: Iterable[tuple[SinumerikUnit, int]], others: Iterable[
 
 
 def refuse(control: Sinumerik, plan: SinumerikPlan, block: int, why: str) -> None:
-    """Note the motion of a block, if it has one."""
+    """Add the motion of a block, if it has one, with unknown end and as refused."""
     if not plan.axes or plan.names & PROGRAMMABLE or not NO_MOTIONS.isdisjoint(plan.g):
         return
     machine = "supa" in plan.names or not MACHINE.isdisjoint(plan.g)
@@ -444,7 +444,7 @@ def refuse(control: Sinumerik, plan: SinumerikPlan, block: int, why: str) -> Non
 
 
 def earliest(unit: SinumerikUnit, block: int) -> int | None:
-    """The first block before `block` that something after it may lead back to."""
+    """The first block before `block` to which a later block may jump back; None if there is none."""
     found: list[int] = []
     for each in range(block, unit.stop):
         if each in unit.begins:
@@ -455,7 +455,7 @@ def earliest(unit: SinumerikUnit, block: int) -> int | None:
 
 
 def targets(unit: SinumerikUnit, step: Branching, block: int) -> list[int]:
-    """Where a jump or a repetition may lead."""
+    """The blocks to which a jump or repetition may lead."""
     if step.keyword == "gotos":
         return [unit.begin]
     if "goto" not in step.keyword and step.keyword not in ("repeat", "repeatb"):
@@ -471,7 +471,7 @@ INNER = frozenset({"if", "else", "endif"})
 
 
 def bypassed(control: Sinumerik, flow: SinumerikFlow, step: Branching, steps: Iterable[Branching]) -> bool:
-    """Go past a branch that nobody can decide, if nothing in it matters; `flow.block` is that of the next line."""
+    """Skip an undecided IF whose blocks do not matter; whether it was skipped. `flow.block` is the next block."""
     if step.keyword != "if":
         return False
     here, unit = flow.block - 1, flow.unit
@@ -490,7 +490,7 @@ def bypassed(control: Sinumerik, flow: SinumerikFlow, step: Branching, steps: It
 
 
 def is_quiet(plan: SinumerikPlan) -> bool:
-    """Whether a block moves nothing, changes no coordinates, and leads nowhere else."""
+    """Whether a block moves nothing, changes no coordinates, and does not jump."""
     if plan.opaque or plan.g or plan.functions or not LOUD_M.isdisjoint(plan.m):
         return False
     if any(setting.address not in QUIET_WORDS for setting in plan.settings):
@@ -499,7 +499,7 @@ def is_quiet(plan: SinumerikPlan) -> bool:
 
 
 def is_quiet_step(step: object) -> bool:
-    """Whether an assignment, a name or a control structure does no more than that."""
+    """Whether an assignment, a name or a control structure moves nothing and changes no coordinates."""
     match step:
         case AssignedVariable(name):
             quiet = not name.startswith("$") and not OF_THE_CONTROL.match(name)
@@ -512,6 +512,6 @@ def is_quiet_step(step: object) -> bool:
 
 
 def unbalanced(unit: SinumerikUnit, begin: int, end: int, *, alone: bool) -> bool:
-    """Whether a structure that begins between two blocks ends elsewhere."""
+    """Whether a control structure that begins between two blocks ends outside of them."""
     inner = range(begin + (0 if alone else 1), end)
     return any(each in inner and not begin <= last <= end for each, last in unit.ends.items())

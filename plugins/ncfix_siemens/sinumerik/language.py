@@ -32,9 +32,9 @@ SAME_ANGLE = 1e-9
 
 
 def runs_straight_on(template: Template) -> bool:
-    """Whether a block of this shape has nothing to do with others elsewhere in the text.
+    """Whether blocks of this shape do not depend on distant blocks of the text.
 
-    Where a block has only one of AP and RP, all blocks that have them depend on each other.
+    If a block has only one of AP and RP, all blocks with these words depend on each other.
     """
     return reach.runs_straight_on(template) and len(polar_words(template)) != 1
 
@@ -49,7 +49,7 @@ def unroll(interpreter: SinumerikInterpreter, steps: Mapping[str, float], limit:
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
-    """What is needed to write motions like that of a block many at a time; None if they need `BlockWriter`."""
+    """The layout to write many motions of a block's shape at once; None if they need `BlockWriter`."""
     layout = layout_of(program, block)
     if layout is None or not layout.axes or layout.polar or layout.angles:
         return None
@@ -64,7 +64,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
 
 
 def arc_in_bulk(program: Program, block: int, layout: SinumerikLayout) -> ArcLayout | None:
-    """Where the words of an arc stand, for arcs that are written many at a time."""
+    """The layout of arc words to write many arcs of a block's shape at once; None if they need `BlockWriter`."""
     fixed = fixed_centre(program.template_of(block))
     if layout.via or layout.angle is not None or layout.forms.keys() & set(CENTRE_LETTERS) - fixed.keys():
         return None
@@ -73,15 +73,15 @@ def arc_in_bulk(program: Program, block: int, layout: SinumerikLayout) -> ArcLay
 
 
 def without(words: Mapping[str, Word], addresses: Container[str]) -> dict[str, Word]:
-    """Words but for those with some addresses."""
+    """Words without those of some addresses."""
     return {address: word for address, word in words.items() if address not in addresses}
 
 
 def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: Ints) -> Mask:
-    """(n,) motions for `BlockWriter`: a changed direction of the tool or angle of DC, or one that further pieces have.
+    """Mask (n,) of the motions for `BlockWriter`, among those with a tool vector or DC.
 
-    So are those in which DC leads past a full turn, to another number than its own. A direction that is the same, and
-    in one piece, leads the rotary axes to where the program has them.
+    These are motions with corrected rotary axes or several pieces, and those in which DC leads past a full turn. An
+    unchanged vector in one piece leads the rotary axes where the program has them.
     """
     shapes = [
         any(word.address in VECTOR or form_of(word) == SHORTEST_WAY for word in template.words)
@@ -96,7 +96,7 @@ def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: Ints
 
 
 def past_a_turn(program: Program, moves: Moves) -> Mask:
-    """(n,) motions in which the shortest way leads to another number than DC has."""
+    """Mask (n,) of the motions in which DC leads to another number than its own, past a full turn."""
     found, shapes = np.zeros(len(moves), dtype=np.bool_), program.template[moves.block]
     for shape, template in enumerate(program.templates):
         for letter, slot in in_form(template, moves.axes, SHORTEST_WAY).items():

@@ -1,6 +1,6 @@
-"""What the codes and names of a block do, and in which order: settings first, then frames, tools, and the motion.
+"""Execution of the codes and names of a block, in order: settings, frames, tools, motion; and calls of subprograms.
 
-Calls of subprograms: by name, by number, by a text; and names that are none of ours.
+Subprograms are called by name, by number or by a text. Unknown names are taken as cycles of the machine's builder.
 """
 
 from __future__ import annotations
@@ -49,16 +49,16 @@ Find = Callable[[str], SinumerikUnit | None]
 UNKNOWN_CYCLE = "NCF252"
 WHERE_IT_IS = "if it is a subprogram, say where its file is: --subprograms DIR"
 TRANSFORMING = ("traori", "transmit", "tracyl", "traang", "tracon", "trafoo")
-"""How names of transformations by kinematic chains begin, `TRANSMIT_K`."""
+"""Prefixes of names of transformations by kinematic chains, such as `TRANSMIT_K`."""
 
 SECTION = "a section of a program is called (CALL BLOCK), which is not followed"
 CALLED_BY_TEXT = frozenset({"call", "extcall"})
 FILE = re.compile(r"(?:^|[/:])(?:_N_)?(?P<name>\w+?)(?:_(?:SPF|MPF)|\.(?:SPF|MPF))?$", re.IGNORECASE)
-"""A program named in a text, perhaps with a path."""
+"""The name of a program in a text, perhaps with a path."""
 
 
 def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
-    """A subprogram, or a cycle of the machine's builder."""
+    """Call a subprogram, or a cycle of the control or the machine's builder."""
     if turn.modal:
         kind = "cycle" if MADE_BY_THE_CONTROL.fullmatch(step.name) else "subprogram"
         control.suspend("cycle", f"the modal {kind} {step.name.upper()} is in force, which ncfix does not follow")
@@ -79,7 +79,7 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
 
 
 def lose_arguments(control: Sinumerik, written: Iterable[Expression | None]) -> None:
-    """Variables that are arguments of what is not at hand may have other values behind it (VAR)."""
+    """Forget variables that are arguments of a program not at hand, which may change them (VAR)."""
     for part in written:
         match part:
             case NumberedParameter(index):
@@ -89,14 +89,17 @@ def lose_arguments(control: Sinumerik, written: Iterable[Expression | None]) -> 
 
 
 def function(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """A function that only the control can evaluate stands in the block."""
+    """Note a function in an expression of the block that only the control can evaluate."""
     if step.name in UNFOLLOWED:
         control.suspend(step.name, f"{UNFOLLOWED[step.name]} is in force, which ncfix does not follow")
     turn.handed += step.written
 
 
 def ran_elsewhere(control: Sinumerik, name: str, *, changes_tool: bool) -> None:
-    """A name or number that is no subprogram at hand is taken as a cycle of the builder; it may change the tool."""
+    """Treat a subprogram not at hand as a cycle of the builder (NCF252): positions are unknown afterwards.
+
+    changes_tool  it may be the one that changes the tool
+    """
     text = f"{name} is not known: it is taken as a cycle that leaves coordinates as they are"
     control.warn(UNKNOWN_CYCLE, text, WHERE_IT_IS)
     control.lose_all(AFTER_CYCLE)
@@ -107,7 +110,7 @@ def ran_elsewhere(control: Sinumerik, name: str, *, changes_tool: bool) -> None:
 
 
 def call_by_text(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
-    """`CALL "NAME"`, `EXTCALL("NAME.SPF")`."""
+    """Execute `CALL "NAME"` or `EXTCALL("NAME.SPF")`."""
     text = plain_text(step.written[0]) if step.written else None
     found = FILE.search(text or "")
     unit = find(found["name"]) if found else None
@@ -120,7 +123,7 @@ def call_by_text(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> N
 
 
 def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
-    """`L123`: a subprogram by its number."""
+    """Execute `L123`, the call of a subprogram by its number."""
     value = turn.words.values.get("L")
     if "L" not in turn.words.values:
         return
@@ -156,7 +159,7 @@ _PASSED = """
     G9 G62 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G972 G973 G290 G471 G472
 """
 PASSED = frozenset(10 * int(code[1:]) for code in _PASSED.split())
-"""G codes that change nothing of where axes go."""
+"""G codes, in tenths, that do not affect positions."""
 
 Handler = Callable[[Sinumerik, int], None]
 SETTINGS: dict[int, Handler] = {
@@ -168,30 +171,31 @@ SETTINGS: dict[int, Handler] = {
     **dict.fromkeys((540, 550, 560, 570, 5000, *range(5050, 6000, 10)), framing.settable),
 }
 ANGLE_KINDS = frozenset({"orieuler", "orirpy", "orirpy2", "orivirt1", "orivirt2"})
-"""What A2 B2 C2 are: the names of one group of G codes."""
+"""The G code names that tell how A2 B2 C2 are meant."""
 
 STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
 
 WORKING_AREA = frozenset({250, 260})
-"""G25 and G26: their words are the limits of the working area, or of the spindle."""
+"""G25 and G26, whose words are limits of the working area or of the spindle."""
 FOR_THIS_BLOCK = {530: "g53", 1530: "g153"} | dict.fromkeys(motion.SOFT_APPROACH, "soft")
 TAKES_WORDS = frozenset({40, 740, 750, 580, 590}) | POLES | WORKING_AREA
 
 
 @mutable
 class Turn:
-    """One block while it is executed.
+    """The execution of one block.
 
-    at_once     T itself changes the tool
-    special     what applies to this block only: `supa`, `g53`, `meas`, `soft`
-    frame       the name of a frame instruction, which takes the axis words
-    subprogram  what is called after the block, with its arguments, so many times; `called` is the name that does it
-    elsewhere   the number that is called after the block, and is no subprogram at hand
+    words       the values of its words; plan: of its shape
+    at_once     T alone changes the tool
+    special     statements that apply to this block only: `supa`, `g53`, `meas`, `soft`
+    frame       name of a frame instruction, which takes the axis words
+    subprogram  the subprogram that is called after the block, with `arguments` (as `written`), `times` times
+    called      the statement that calls it
+    elsewhere   the number of a subprogram that is called after the block and is not at hand
     contour     the call of a cycle that mills along a contour
-    modal       MCALL stands in the block
-    ends        RET stands in the block
-    used        something takes the axis words for itself
-    handed      arguments of what is not at hand
+    modal       whether MCALL is in the block; ends: whether RET is
+    used        whether another statement has taken the axis words
+    handed      arguments of programs that are not at hand
     """
 
     words: BlockWordValues
@@ -222,7 +226,7 @@ class Turn:
 
 
 def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
-    """Do what a name says, as far as it does not wait for the words of the block."""
+    """Execute a name of a block at once, except for parts that need the other words (done in `finish_block`)."""
     name = step.name
     if {"call", "block"} <= turn.plan.names:
         if name == "call":
@@ -268,12 +272,12 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
 
 
 def supa(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """SUPA: this block goes in machine coordinates."""
+    """SUPA: the words of this block are machine coordinates."""
     turn.special.add("supa")
 
 
 def transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """TRAORI."""
+    """TRAORI: switch tool-centre-point control on."""
     mind_frame(control, step)
     control.resume("traori")
     if len(step.written) > 1:
@@ -287,21 +291,21 @@ def transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
 
 
 def tolerance(control: Sinumerik, step: Calling) -> None:
-    """CYCLE832: older controls take the third digit of its second argument as that of a transformation."""
+    """CYCLE832: on older controls the third digit of its second argument may switch TRAORI on."""
     kind = number(step.arguments[1](control)) if len(step.arguments) > 1 else None
     if kind is not None and round(kind) // 100 % 10 and not control.modes.transformed:
         control.suspend("traori", SWITCHED_ON)
 
 
 def mind_frame(control: Sinumerik, step: Calling) -> None:
-    """A programmed frame is in force while a transformation goes on or off: machine data say whether it stays."""
+    """At a change of the transformation: a programmed frame becomes doubtful, as machine data tell whether it stays."""
     if control.frames.programmable != WORLD and control.variables.value(FRAMES_STAY) != 1.0:
         control.suspend("frame", FRAME_OVER.format(step.name.upper()))
     control.modes.carried = step.name.upper()
 
 
 def no_transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """TRAFOOF."""
+    """TRAFOOF: switch transformations off."""
     if control.modes.transformed:
         mind_frame(control, step)
     control.modes.transformed = False
@@ -310,7 +314,7 @@ def no_transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
 
 
 def end_unfollowed(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """TRAFOOF, TOROTOF, PAROTOF, CP: what they end is not in force any more."""
+    """TRAFOOF, TOROTOF, PAROTOF, CP: end suspended statements; positions are unknown afterwards."""
     over = ENDED_BY[step.name] & control.suspended.keys()
     for name in over:
         control.resume(name)
@@ -319,7 +323,7 @@ def end_unfollowed(control: Sinumerik, turn: Turn, step: Calling) -> None:
 
 
 def modal_call(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """MCALL: what follows it is called after each motion; alone it ends that."""
+    """MCALL: the call in this block becomes modal; without a call it ends the modal one."""
     turn.modal = True
     control.modes.modal_cycle = None
     if control.resume("cycle"):
@@ -327,7 +331,7 @@ def modal_call(control: Sinumerik, turn: Turn, step: Calling) -> None:
 
 
 def define(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """DEF."""
+    """DEF: define variables."""
     if not step.arguments:
         raise Fault("NCF110", "DEF has no type and no name", "DEF REAL NAME, at the beginning of a block")
     kind = str(step.arguments[0](control))
@@ -346,7 +350,7 @@ def define(control: Sinumerik, turn: Turn, step: Calling) -> None:
 
 
 def sizes_of(control: Sinumerik, variable: NamedParameter | FunctionCall) -> tuple[int, ...]:
-    """How many elements an array has; none for a plain variable, and where that is known only at run time."""
+    """The sizes of an array; empty for a plain variable, or if they are known only at run time."""
     if isinstance(variable, NamedParameter):
         return ()
     found = [number(part(control)) for part in evaluates(variable.arguments)]
@@ -354,14 +358,14 @@ def sizes_of(control: Sinumerik, variable: NamedParameter | FunctionCall) -> tup
 
 
 def come_back(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """RET, perhaps with a place in the program that has called."""
+    """RET: return; with a target in the caller the rest is refused."""
     turn.ends = True
     if any(part is not None for part in step.written):
         control.refuse_rest(RETURNS_ELSEWHERE)
 
 
 def measure(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """MEAS and MEAW without a value stand with a motion."""
+    """MEAS and MEAW without a value: the motion of the block measures."""
     turn.special.add("meas")
 
 
@@ -383,7 +387,7 @@ SPECIAL: dict[str, Callable[[Sinumerik, Turn, Calling], None]] = {
 
 
 def finish_block(control: Sinumerik, turn: Turn) -> None:
-    """Codes and words of the block, and its motion."""
+    """Execute the codes and words of the block, and its motion."""
     words, plan = turn.words, turn.plan
     words.whole = turn.subprogram is not None or bool(turn.elsewhere)
     if "G" in words.values:
@@ -414,7 +418,7 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
 
 
 def additive_offset(control: Sinumerik, turn: Turn) -> None:
-    """DL: an additive offset of the edge in force, which the setup does not give; D without it takes it away."""
+    """DL: an additive tool offset, whose value only the control knows, suspends motions; D without DL ends it."""
     letting = next((step for step in turn.plan.steps if isinstance(step, AssignedVariable) and step.name == "dl"), None)
     if letting is not None and (letting.value is None or letting.value(control) != 0.0):
         control.suspend("dl", ADDITIVE)
@@ -423,7 +427,7 @@ def additive_offset(control: Sinumerik, turn: Turn) -> None:
 
 
 def codes(control: Sinumerik, turn: Turn) -> None:
-    """The G codes of a block."""
+    """Execute the G codes of a block."""
     chosen = [f"G{code // 10}" for code in turn.plan.g if code in STRAIGHT_AND_ARCS or code in UNFOLLOWED_MOTIONS]
     chosen += sorted(name.upper() for name in MOTIONS.keys() & turn.plan.names)
     if len(set(chosen)) > 1:
@@ -444,7 +448,7 @@ def codes(control: Sinumerik, turn: Turn) -> None:
 
 
 def takes_words(control: Sinumerik, turn: Turn, code: int) -> None:
-    """Codes that take the words of the block for themselves."""
+    """Execute codes that take the axis words of the block: dwell, reference points, poles, G58, G59, G25, G26."""
     turn.used = True
     if code == 40:
         motion.dwell(control, turn.words)
@@ -461,7 +465,7 @@ def takes_words(control: Sinumerik, turn: Turn, code: int) -> None:
 
 
 def feed(control: Sinumerik, turn: Turn) -> None:
-    """F, unless it is the time of a dwell."""
+    """Set the feed by F, unless it is the time of a dwell."""
     if "F" not in turn.words.values or 40 in turn.plan.g:
         return
     value, modal = turn.words.values["F"], control.modal
@@ -470,7 +474,7 @@ def feed(control: Sinumerik, turn: Turn) -> None:
 
 
 def strangers(control: Sinumerik, words: BlockWordValues) -> None:
-    """Axes that the program moves and the machine lacks."""
+    """Note axes that the program moves but the machine lacks."""
     for address in words.values:
         extended = len(address) > 1 and address[0] in "XYZABCUVWQ" and address[1:].isdigit()
         if address in PATH_WORDS and address not in INDEX:
@@ -481,6 +485,6 @@ def strangers(control: Sinumerik, words: BlockWordValues) -> None:
 
 
 def say(text: str) -> str:
-    """A block as it is named in a message."""
+    """A block shortened for a message, in quotes."""
     short = " ".join(text.split(";")[0].split())
     return f"'{short[:40]}...'" if len(short) > 40 else f"'{short}'"

@@ -1,11 +1,9 @@
-"""A program text while it is executed: its plans, its control structures and labels, and what it is called with.
+"""A program of a text: its plans, control structures, labels and parameters; and directions of tool vectors.
 
-A file of an archive may hold several programs, each under its `%_N_NAME_SPF` line: each is a unit of its own.
+A file of an archive may hold several programs, each under its `%_N_NAME_SPF` line; each is a unit of its own.
 
-Where the vectors A3 B3 C3 of the blocks to come point the tool: the ways of the rotary axes, found for many at once.
-
-Neither where the axes stand nor which way they take matters here: what has been found stays true whatever happens
-meanwhile. Coordinates that are turned do not come here.
+`Directions` computes the rotary positions for the vectors A3 B3 C3 of many blocks at once. They do not depend on the
+current axis positions or the way taken, so they stay valid. Rotated coordinates are not handled here.
 """
 
 from __future__ import annotations
@@ -43,15 +41,17 @@ CLOSING = {end: begin for begin, end in OPENING.items()}
 BROKEN = "NCF230"
 
 NO_LENGTH = 1e-9
-"""A shorter vector says nothing."""
+"""Length below which a vector has no direction."""
 
 
 @frozen
 class ProcParameter:
-    """A parameter of a `PROC`: its type and name, and its value where the call leaves it out.
+    """A parameter of a `PROC`.
 
-    by_reference  the caller's variable may be changed (VAR)
-    is_array      that is an array
+    kind, name    its type and name
+    by_reference  whether the caller's variable may be changed (VAR)
+    is_array      whether it is an array
+    left_out      its value if the call omits it
     """
 
     kind: str
@@ -64,15 +64,15 @@ class ProcParameter:
 class SinumerikUnit(TextUnit[SinumerikPlan]):
     """One program of a text.
 
-    name        upper case; empty where no head says it; so is `kind`: MPF, SPF, ...
+    name        name in upper case, "" without a head; kind: MPF, SPF, ... likewise
     ends        block of a structure's begin -> block of its end, and ELSE -> ENDIF
-    others      block of an IF -> block of its ELSE, where it has one
+    others      block of an IF -> block of its ELSE, if it has one
     begins      block of a structure's end -> block of its begin
-    some_deletable  a part of a structure has / before it
-    labels      label -> the blocks where it stands
-    parameters  of its PROC
-    saves       the PROC says SAVE: modal codes and frames of the caller come back
-    directions  where their vectors point the tool
+    some_deletable  whether a part of a structure has block skip (/)
+    labels      label -> the blocks with it
+    parameters  parameters of its PROC
+    saves       whether the PROC has SAVE: modal codes and frames of the caller are restored
+    directions  rotary positions for its tool vectors
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
         return np.array([plan.lane is None or plan.vector is not None for plan in self.all_plans()], dtype=np.bool_)
 
     def lane_end(self, block: int) -> int:
-        """See `TextUnit`; a block whose `DC` is another thing than the number in it goes by itself."""
+        """See `TextUnit`; a block whose `DC` does not lead to the number in it is executed alone."""
         if self._long_ways is None:
             shortest = self.all_shortest()
             found = [self.long_ways(letter) for letter in range(N_LETTERS) if np.any(shortest >> letter & 1)]
@@ -119,15 +119,15 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
         return min(super().lane_end(block), int(self._long_ways[np.searchsorted(self._long_ways, block)]))
 
     def all_shortest(self) -> Ints:
-        """(s,) the axes that go the shortest way in blocks of each shape, as bits."""
+        """(s,) bit mask of the axes with `DC` in blocks of each shape."""
         if self._shortest is None:
             self._shortest = np.array([plan.shortest for plan in self.all_plans()], dtype=np.int64)
         return self._shortest
 
     def long_ways(self, letter: int) -> Ints:
-        """The blocks where an axis goes past a full turn, or beside which its words are in another form.
+        """The blocks in which `DC` may take an axis past a full turn, or where its words change between forms.
 
-        Elsewhere the shortest way leads to the number itself, from the number of the last block that names the axis.
+        In all others the shortest way from the last number of the axis leads to the number itself.
         """
         named = np.array([plan.axes >> letter & 1 for plan in self.all_plans()], dtype=np.bool_)
         rows = np.flatnonzero(named[self.program.template[self.begin : self.stop]]) + self.begin
@@ -139,7 +139,7 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
         return rows[other | (shortest & ~near)]
 
     def shortest_ways(self, block: int, stop: int) -> Iterator[tuple[int, float]]:
-        """The axes that go the shortest way in these blocks, and to which angle first, degrees."""
+        """The axes with `DC` in these blocks, each with its first angle, degree."""
         if not self.all_shortest().any():
             return
         shapes = self.program.template[block:stop]
@@ -150,7 +150,7 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
                 yield letter, float(self.program.numbers[self.program.first_number[block + found[0]] + slot])
 
     def vector_end(self, block: int) -> int:
-        """The first block from `block` on that gives no direction of the tool, or is not for the fast lane."""
+        """The first block from `block` on without a tool vector, or not for the fast lane."""
         if self._vector_stops is None:
             given = [shape for shape, plan in enumerate(self.all_plans()) if plan.vector is None]
             self._vector_stops = np.array([*self.blocks_of(given), self.stop])
@@ -196,25 +196,25 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
                 self.ends[self.others[begin]] = block
 
     def parts_of(self, block: int) -> tuple[int, ...]:
-        """The blocks of the structure that has a part in a block: where it begins, its ELSE, and its end."""
+        """The blocks of begin, ELSE and end of the structure of which `block` is one."""
         begin = next((each for each, other in self.others.items() if other == block), self.begins.get(block, block))
         parts = begin, self.others.get(begin), self.ends.get(begin)
         return tuple(each for each in parts if each is not None)
 
     def end_of(self, block: int, keyword: str) -> int:
-        """Where the structure that begins in a block ends; raises `Fault` if it does not."""
+        """The block in which the structure that begins in `block` ends; raises `Fault` if it does not end."""
         if block not in self.ends:
             raise Fault(BROKEN, f"{OPENING.get(keyword, 'ENDIF').upper()} of this {keyword.upper()} is missing")
         return self.ends[block]
 
     def begin_of(self, block: int, keyword: str) -> int:
-        """Where the structure begins that ends in a block; raises `Fault` if it does not."""
+        """The block in which the structure that ends in `block` begins; raises `Fault` if there is none."""
         if block not in self.begins:
             raise Fault(BROKEN, f"{keyword.upper()} without a {CLOSING[keyword].upper()} before it")
         return self.begins[block]
 
     def find(self, label: str, block: int, keyword: str) -> int | None:
-        """The block that a jump leads to; None if there is none in the direction that it looks."""
+        """The target block of a jump from `block`; None if there is none in the direction that it searches."""
         places = self.labelled(label)
         forward = [place for place in places if place > block]
         backward = [place for place in places if place <= block]
@@ -225,7 +225,7 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
         return forward[0] if forward else backward[-1] if backward else None
 
     def labelled(self, label: str) -> list[int]:
-        """The blocks that bear a label, or a block number."""
+        """The blocks with a label, or with a block number `N100`."""
         if label in self.labels or not (label[:1] == "N" and label[1:].isdigit()):
             return self.labels.get(label, [])
         wanted = float(label[1:])
@@ -239,7 +239,7 @@ class SinumerikUnit(TextUnit[SinumerikPlan]):
         return float(self.numbers[self.first[block]])
 
     def solitary(self) -> Iterator[int]:
-        """The blocks that REPEATB repeats, or with which a section of REPEAT ends."""
+        """The blocks that REPEATB repeats, or that end a section of REPEAT: no lines may be inserted after them."""
         for block in range(self.begin, self.stop) if self.labels else ():
             for step in self.branchings(block):
                 if step.keyword == "repeatb":
@@ -273,7 +273,7 @@ def parameters(text: str) -> Iterator[ProcParameter]:
 
 
 def is_remark(plan: SinumerikPlan) -> bool:
-    """Whether a block does nothing."""
+    """Whether a block has no effect."""
     return not (plan.settings or plan.steps or plan.g or plan.m or plan.opaque)
 
 
@@ -301,20 +301,23 @@ def units_of(program: Program, external: str = "") -> list[SinumerikUnit]:
 
 @mutable
 class Directions:
-    """The ways to point the tool in blocks from `begin` on."""
+    """Cached rotary positions for the tool vectors of blocks from `begin` on."""
 
     begin: int = 0
     ways: list[Ways] = field(default_factory=list)
 
     def known(self, pointing: Pointing, unit: SinumerikUnit, block: int, stop: int, least: int) -> list[Ways]:
-        """The ways from a block on: of so many blocks at least, unless one of them gives no direction, up to `stop`."""
+        """The positions for blocks from `block` up to `stop`; shorter if a vector is not reached or has no length.
+
+        least  recompute if fewer than this are cached
+        """
         if not self.begin <= block <= self.begin + len(self.ways) - least:
             self.begin, self.ways = block, ways_of(pointing, vectors_of(unit, block, stop))
         return self.ways[block - self.begin : stop - self.begin]
 
 
 def vectors_of(unit: SinumerikUnit, start: int, stop: int) -> Array:
-    """(n, 3) the components of the vectors of blocks; zero where one is not written."""
+    """The tool vectors of blocks, (n, 3); omitted components are zero."""
     program = unit.program
     slots = unit.vectors[program.template[start:stop]]
     values = program.numbers[program.first_number[start:stop, None] + np.maximum(slots, 0)]
@@ -322,7 +325,7 @@ def vectors_of(unit: SinumerikUnit, start: int, stop: int) -> Array:
 
 
 def ways_of(pointing: Pointing, vectors: Array) -> list[Ways]:
-    """The two ways to each direction of vectors (n, 3), up to the first that has no length or is not reached."""
+    """The two rotary positions for each vector (n, 3), up to the first one without length or out of reach."""
     x, y, z = vectors.T
     length = to_each(math.hypot, x, y, z)
     size = np.maximum(length, NO_LENGTH)

@@ -254,7 +254,7 @@ class SinumerikWriter(BlockWriter):
         return position
 
     def _led_to(self, call: CycleCall, arguments: list[str] | None) -> Array:
-        """Write a hole of a modal cycle: the words of the motion, with a corrected call before and the original after."""
+        """Write a hole of a modal cycle: the words of its motion, between a corrected call and the original one."""
         if arguments is not None:
             self._check(call)
             at, line_end = self.program.position(self.block, self.layout.begins), self.program.line_end.decode()

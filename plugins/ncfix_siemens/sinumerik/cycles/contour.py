@@ -1,7 +1,7 @@
-"""Milling along a contour (CYCLE72): down where the contour begins, then block after block at the bottom of the cycle.
+"""Milling along a contour (CYCLE72), followed as a plunge at its start, then block by block at the bottom depth.
 
-So each point of the contour is corrected where it stands. The contour is a subprogram of the text, or stands between
-two labels; CYCLE62 may name it.
+So each point of the contour is corrected at its position. The contour is a subprogram of the text, or the blocks
+between two labels; CYCLE62 may name it.
 Source: Siemens, "SINUMERIK 840D sl, NC programming": CYCLE62, CYCLE72.
 """
 
@@ -27,7 +27,7 @@ CONTOUR_NAMES = frozenset({"diamof", "ret"})
 ENDS = frozenset({20, 170})
 """M2 and M17."""
 CONTOURS = {0: "{0}", 1: "E_LAB_A_{0}:E_LAB_E_{0}", 2: "{1}:{2}"}
-"""What CYCLE62 means by its second argument: a subprogram, a contour of the editor, two labels."""
+"""Second argument of CYCLE62 -> form of the contour: a subprogram, a contour of the editor, two labels."""
 
 NO_CONTOUR = "the contour of {} is not found: it has to be a subprogram, or to stand between two labels"
 NOT_REWRITTEN = "{} or its contour is in the file of a subprogram, which is not rewritten"
@@ -46,10 +46,11 @@ def mill_along(
     find: Callable[[str], SinumerikUnit | None],
     evaluate: Callable[[SinumerikPlan, int], BlockWordValues],
 ) -> None:
-    """A cycle that mills along a contour: down to its bottom where that begins, then block after block.
+    """Execute a cycle that mills along a contour: plunge at its start, then follow it block by block.
 
-    words     the words of its block; find: a subprogram by its name
-    evaluate  the words of a block of the text that `control` reads numbers from
+    words     the words of the cycle's block
+    find      name -> subprogram
+    evaluate  plan and index of a block -> its words, with numbers from the text that `control` reads
     """
     called, name, drilling = step.name.upper(), contour_named(control, step), milling_of(control, step, modal=False)
     fault, found = drilling.fault, flow.stretch(name, find)
@@ -70,7 +71,7 @@ def mill_along(
 
 
 def first_of(contour: Stretch, plane: Plane) -> tuple[int | None, str]:
-    """The block that leads to where a contour begins, or why it cannot be followed."""
+    """The block that leads to the start of a contour; else None and the reason why it cannot be followed."""
     blocks = range(contour.start, contour.stop)
     plans = [contour.unit.plan(block) for block in blocks]
     end = next((place for place, plan in enumerate(plans) if "ret" in plan.names or not ENDS.isdisjoint(plan.m)), None)
@@ -83,13 +84,13 @@ def first_of(contour: Stretch, plane: Plane) -> tuple[int | None, str]:
 
 
 def place_in(words: BlockWordValues, plane: Plane) -> tuple[float, float] | None:
-    """The place in the plane that a block names, in program units; None if that is not known."""
+    """The position in the plane that a block names, in program units; None if unknown."""
     one, two = (words.values.get(letter) for letter in plane.of(LETTERS))
     return None if one is None or two is None or words.forms else (one, two)
 
 
 def may_be_contour(plan: SinumerikPlan, plane: Plane) -> bool:
-    """Whether a block leads along a line or an arc in the plane, if anywhere, and does nothing else."""
+    """Whether a block has at most a line or an arc in the plane, and no other effect."""
     for step in plan.steps:
         match step:
             case Calling(name) if name in CONTOUR_NAMES:
@@ -103,7 +104,7 @@ def may_be_contour(plan: SinumerikPlan, plane: Plane) -> bool:
 
 
 def contour_named(control: Sinumerik, step: Calling) -> str:
-    """The contour that a call of CYCLE72 names, itself or by one CYCLE62 before it; empty if it names none."""
+    """Name of the contour of a CYCLE72: its argument, or the single CYCLE62 before it; "" if there is none."""
     said, _ = said_in(control, step)
     name = said[0] if said and isinstance(said[0], str) else ""
     if not name and len(control.contours) == 1:

@@ -1,11 +1,11 @@
-"""Cycles, called where the axes stand, at a place of their own or, with MCALL, after every motion.
+"""Execution of cycles: drilling, milling, measuring and patterns of holes, single or modal (MCALL).
 
-A hole is one motion to its bottom, as in all languages: what leads to it under MCALL ends in a hole, and is no rapid.
-Its place is corrected for the bottom, in the block that leads to it. How deep it is stands in the call, so a hole that
-needs another depth gets a call of its own.
+A hole is followed as one motion to its bottom, as in all languages: a motion under MCALL ends in a hole, and is no
+rapid. The place of a hole is corrected for its bottom, in the block that leads to it. The depth is an argument of the
+call, so a hole with a corrected depth gets a call of its own.
 Source: Siemens, "SINUMERIK, cycles": CYCLE81 to CYCLE89, CYCLE840 (RTP, RFP, SDIS, DP, DPR).
 
-Holes in a row (HOLES1) and on a circle (HOLES2): where the control takes the modal cycle to.
+Patterns are holes in a row (HOLES1), on a circle (HOLES2) and at listed places (CYCLE802), under a modal cycle.
 """
 
 from __future__ import annotations
@@ -45,13 +45,14 @@ Points = tuple[tuple[float, float], ...]
 """Places in the plane, in program units."""
 
 ARGUMENTS = 6
-MOST = 1000
+"""Smallest number of arguments of a pattern."""
+MAX_HOLES = 1000
 WRITE_OUT = "holes whose places the control makes up ({}): --flatten writes them out"
 AFTER_PATTERN = "where the axis {} stands after a pattern of holes is not followed"
 
 
 def row(values: Sequence[float | None]) -> Points:
-    """HOLES1."""
+    """The places of HOLES1."""
     x, y, angle, first, step, count = (value or 0.0 for value in values)
     ways = (first + step * k for k in range(round(count)))
     turn = math.radians(angle)
@@ -59,7 +60,7 @@ def row(values: Sequence[float | None]) -> Points:
 
 
 def circle(values: Sequence[float | None]) -> Points:
-    """HOLES2; an angle between holes of zero means that they divide the circle evenly."""
+    """The places of HOLES2; an indexing angle of zero divides the circle evenly."""
     x, y, radius, angle, step, count = (value or 0.0 for value in values)
     step = step or 360.0 / max(count, 1.0)
     turns = (math.radians(angle + step * k) for k in range(round(count)))
@@ -67,7 +68,7 @@ def circle(values: Sequence[float | None]) -> Points:
 
 
 def listed(values: Sequence[float | None]) -> Points:
-    """CYCLE802: up to nine places; the first two arguments have a digit for each, one where it is absolute."""
+    """The places of CYCLE802, up to nine; the first two arguments have a digit for each: 1 if it is absolute."""
     across, along, *places = values
     known = [value for value in places if value is not None]
     absolute = all(mode is not None and {*f"{mode:.0f}"} == {"1"} for mode in (across, along))
@@ -77,17 +78,17 @@ def listed(values: Sequence[float | None]) -> Points:
 
 
 PATTERNS = {"holes1": (6, row), "holes2": (6, circle), "cycle802": (20, listed)}
-"""How many arguments say where the holes are, and what they mean."""
+"""Cycle -> number of its arguments of position, and the function that evaluates them."""
 SAYS_IT_AGAIN = {True: 2000.0, False: 1000.0}
-"""VARI of HOLES2 where the circle is one in part, and where it is a full one."""
+"""VARI of HOLES2 for a partial circle (True) and a full circle (False), which repeats what its angle tells."""
 
 
 def points_of(control: Sinumerik, step: Calling) -> Points:
-    """The places of a pattern in the order in which they are drilled; empty if that cannot be followed.
+    """The places of a pattern in the order of drilling; empty if the pattern cannot be followed.
 
-    Behind them stand VARI (not in CYCLE802), UMODE, HIDE and NSP, which say how to go on or leave places out, and
-    DMODE, whose last digit may choose a plane. G0 must be in force, so that it still is when the holes have been
-    written out.
+    After the arguments of position follow VARI (not in CYCLE802), UMODE, HIDE and NSP, which affect the order or skip
+    places, and DMODE, whose last digit may select a plane. G0 must be in force, as it is after the holes are written
+    out.
     """
     modal, (count, places) = control.modal, PATTERNS.get(step.name, (0, row))
     plain = modal.motion == 0 and not (modal.incremental or modal.diameter) and control.modes.modal_cycle is not None
@@ -103,7 +104,7 @@ def points_of(control: Sinumerik, step: Calling) -> Points:
     chosen = digit_of((mode,), 0)
     if any(hiding) or (chosen and PLANES.get(chosen) != modal.plane.across):
         return ()
-    if places is not listed and not 1 <= (values[ARGUMENTS - 1] or 0.0) <= MOST:
+    if places is not listed and not 1 <= (values[ARGUMENTS - 1] or 0.0) <= MAX_HOLES:
         return ()
     points = places([*values, *[None] * (count - len(values))])
     control.budget.spend(len(points))
@@ -111,7 +112,7 @@ def points_of(control: Sinumerik, step: Calling) -> Points:
 
 
 def is_nearer(control: Sinumerik, last: tuple[float, float], first: tuple[float, float]) -> bool:
-    """Whether the axes stand nearer to the last place than to the first."""
+    """Whether the axes are nearer to the last place than to the first."""
     plane = control.modal.plane
     if any(control.lost_in_frame().get(index, AFTER_PATTERN) != AFTER_PATTERN for index in plane.pair):
         return False
@@ -122,7 +123,7 @@ def is_nearer(control: Sinumerik, last: tuple[float, float], first: tuple[float,
 def lead_to(
     control: Sinumerik, block: int, point: tuple[float, float], name: str
 ) -> tuple[BlockWordValues, MotionEnd, str]:
-    """The words that lead to a place, where that is, and why its hole is not corrected."""
+    """The words and the end of a motion to a place, and the reason why its hole is not corrected."""
     plane, program, lost = control.modal.plane, control.program_position(), dict(control.lost_in_frame())
     axes = plane.axes
     for index, value in zip(plane.pair, point, strict=True):
@@ -133,7 +134,7 @@ def lead_to(
 
 
 POCKETS = frozenset({"cycle63", "cycle64"})
-"""Cycles that use up the contours that CYCLE62 has named."""
+"""Cycles that use the contours named by CYCLE62."""
 
 MADE = "motions that the control makes up ({})"
 MADE_HOLES = "holes whose places the control makes up ({})"
@@ -149,17 +150,17 @@ MEASURES = "{} measures, and may set a work offset at run time, until the progra
 AFTER_CYCLE = "where the axis {} stands after a cycle is not followed"
 
 CENTRING, GEOMETRY_MODE = "cycle81", 6
-"""The cycle that can go down to a diameter, and which argument says so."""
+"""The cycle whose depth may be given by a diameter, and the index of the argument that tells (_GMODE)."""
 
 PLANE_AT = {"cycle81": 7, "cycle82": 7, "cycle83": 18, "cycle85": 9, "cycle86": 12}
-"""Which argument of a drilling cycle is DMODE, whose last digit may choose a plane for it."""
+"""Drilling cycle -> index of its argument DMODE, whose last digit may select a plane."""
 AXIS_AT = {"cycle83": 12, "cycle84": 12, "cycle840": 11}
-"""Which is AXN: 1 and 2 make it drill along an axis of the plane."""
+"""Drilling cycle -> index of its argument AXN; values 1 and 2 select a drilling axis in the plane."""
 OTHER_AXIS = "{} drills along an axis of the plane in force (AXN)"
 
 
 def drilling_of(control: Sinumerik, step: Calling) -> Drilling:
-    """A drilling cycle as it is called, from the arguments RTP, RFP, SDIS, DP, DPR."""
+    """The call of a drilling cycle, evaluated from the arguments RTP, RFP, SDIS, DP, DPR."""
     values = tuple(value(control) for value in step.arguments)
     given = [(part is not None, number(value)) for part, value in zip(step.written, values, strict=True)]
     (_, clear), (_, reference), _, (is_deep, deep), (is_way, way) = (given + [(False, None)] * 5)[:5]
@@ -189,13 +190,13 @@ def drilling_of(control: Sinumerik, step: Calling) -> Drilling:
 
 
 def digit_of(said: Sequence[float | str | None], place: int | None) -> int:
-    """The last digit of an argument; zero where it is not given."""
+    """The last digit of an argument; zero if it is not given."""
     value = said[place] if place is not None and place < len(said) else None
     return digit(value) if isinstance(value, float) else 0
 
 
 def call_of(control: Sinumerik, drilling: Drilling, block: int, *, modal: bool) -> CycleCall:
-    """The call for a hole in a block of the program that is executed."""
+    """The cycle call of a hole, for the writer."""
     fixed = ALONE if block in control.solitary else ""
     if modal and drilling.external != control.external:
         fixed = fixed or ELSEWHERE
@@ -210,7 +211,7 @@ def call_of(control: Sinumerik, drilling: Drilling, block: int, *, modal: bool) 
 
 
 def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: bool) -> None:
-    """A cycle of the control: kept for later (MCALL), or executed here."""
+    """Execute a cycle of the control, or keep it as the modal one (MCALL)."""
     name, block = step.name.upper(), words.block
     if step.name not in DRILLING and step.name not in MILLING:
         if points := points_of(control, step):
@@ -238,7 +239,7 @@ def cycle(control: Sinumerik, words: BlockWordValues, step: Calling, *, modal: b
 
 
 def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
-    """The modal cycle at each place of a pattern; behind it nobody knows for certain at which the axes stand."""
+    """Execute the modal cycle at each place of a pattern; the position in the plane is unknown afterwards."""
     drilling, plane = control.modes.modal_cycle, control.modal.plane
     assert drilling is not None
     control.pattern = points
@@ -250,7 +251,7 @@ def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
 
 
 def hole_after(control: Sinumerik, words: BlockWordValues) -> None:
-    """The modal cycle behind a motion that is none to a hole: a hole where that has led."""
+    """Execute the modal cycle after a motion that does not lead to a hole, as a refused hole at its end."""
     drilling = control.modes.modal_cycle
     assert drilling is not None
     drill(control, BlockWordValues(words.block), control.here(), drilling, refusal=TO_A_HOLE, modal=True)
@@ -265,9 +266,11 @@ def drill(
     refusal: str = "",
     modal: bool = False,
 ) -> None:
-    """One hole: over its place, which the words say, down to its depth, and up again.
+    """Add one hole: the motion over its place, down to its depth, and the retraction.
 
-    modal  the words lead to it, the cycle is in force; else the cycle is called where the axes stand
+    over     the end of the motion by the words
+    refusal  why the hole is refused
+    modal    the cycle is modal and the words lead to the hole; else it is called where the axes stand
     """
     across, stated = control.modal.plane.across, words.axes
     if drilling.fault:
@@ -294,7 +297,7 @@ def drill(
 
 
 def at_height(control: Sinumerik, over: MotionEnd, height: float) -> MotionEnd:
-    """The place at a height along the tool, in program units, where the other coordinates are those of `over`."""
+    """The position of `over` with another height along the tool, in program units."""
     across = control.modal.plane.across
     inner = [value - offset for value, offset in zip(over.target, control.offset, strict=True)]
     program = rotated(control.inverse, inner) if control.is_rotated else inner
@@ -309,7 +312,7 @@ def at_height(control: Sinumerik, over: MotionEnd, height: float) -> MotionEnd:
 
 
 def measure(control: Sinumerik, block: int, step: Calling) -> None:
-    """A cycle that measures: it may set the work offset, unless its second argument (S_KNUM) is zero or left out."""
+    """Execute a measuring cycle, which may set the work offset unless its argument 2 (S_KNUM) is zero or absent."""
     name = step.name.upper()
     made(control, block, passing=Passing(Pass.PROBING, f"measuring ({name})"))
     if len(step.arguments) > 1:
@@ -321,7 +324,7 @@ def measure(control: Sinumerik, block: int, step: Calling) -> None:
 
 
 def made(control: Sinumerik, block: int, *, refusal: str = "", passing: Passing | None = None) -> None:
-    """Motions that the control makes up: where the axes stand after them is not known."""
+    """Add motions that the control generates; the position of X, Y and Z is unknown afterwards."""
     gone = [index for index in GEOMETRY if index in control.axis_indices]
     lost = dict(control.lost_in_frame()) | dict.fromkeys(gone, AFTER_CYCLE)
     words = BlockWordValues(block, axes=mask_of(gone))

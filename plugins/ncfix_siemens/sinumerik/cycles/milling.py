@@ -1,8 +1,8 @@
-"""Milling cycles that say at which place and how deep they work: pockets, slots, studs, faces, threads.
+"""Milling cycles whose call names place and depth: pockets, slots, studs, faces, threads.
 
-Such a cycle is one motion to its bottom at the place that its call names, and is moved as a whole: its place, the
-height that it counts from (RFP) and its bottom by the same way. So it keeps its size and its steps in depth. What
-counts from RFP (DPR, a way down in DP, the depth of a chamfer) stays as it is written.
+Such a cycle is followed as one motion to its bottom at the named place, and is corrected as a whole: place, reference
+plane (RFP) and bottom are shifted by the same amount. So its size and depth steps stay. Arguments that count from RFP
+(DPR, an incremental DP, the depth of a chamfer) are not changed.
 Source: Siemens, "SINUMERIK 840D sl/828D, Job planning", "Programming cycles externally"; the shorter calls of older
 controls: "SINUMERIK, cycles".
 """
@@ -21,18 +21,18 @@ from ncfix_siemens.sinumerik.vocabulary import DP, DPR, RFP, RTP, Drilling
 
 
 class MillingCycle(NamedTuple):
-    """Where the arguments of a milling cycle stand; the first are RTP, RFP, SDIS and DP, and there is no other at 0.
+    """Indices of the arguments of a milling cycle. The first are RTP, RFP, SDIS and DP; index 0 means "none" below.
 
-    point    its place in the plane (PA, PO): the first of two arguments, as of all that stand for two axes
-    way      whether DPR stands behind DP; else DP itself may be the way down, by `mode`
-    variant  what is milled (VARI): the last digit says whether it is a chamfer; 0: never
-    mode     how lengths are meant (AMODE): the last digit says so of the depth, the hundreds of a chamfer's (ZFS).
-             Before it stands DMODE, whose last digit may choose a plane for the cycle. 0: it has neither
-    size     of a face, of which the place is a corner: length and width
-    corner   the hundreds and thousands of the mode may make these an opposite corner
-    angle    by which the face is turned about its corner; 0: it is not
-    named    a contour, which the argument before all these names, says where it works
-    counts   how many arguments a call may have, that name among them; empty: any
+    point    its place in the plane (PA, PO): the first of two arguments
+    way      whether DPR follows DP; else DP itself may be incremental, by `mode`
+    variant  machining type (VARI), whose last digit tells whether it is a chamfer
+    mode     mode of lengths (AMODE): the last digit for the depth, the hundreds for the depth of a chamfer (ZFS). The
+             argument before it is DMODE, whose last digit may select a plane
+    size     length and width of a face whose place is a corner: the first of two arguments
+    corner   whether the hundreds and thousands of the mode may turn these into an opposite corner
+    angle    rotation of the face about its corner
+    named    whether a contour gives the place; its name is then an argument before all these
+    counts   possible numbers of arguments of a call, with that name; empty: any
     """
 
     point: int
@@ -47,7 +47,7 @@ class MillingCycle(NamedTuple):
 
     @property
     def places(self) -> set[int]:
-        """The arguments that say where and how deep it works."""
+        """Indices of the arguments of place and depth."""
         shown = {self.mode - 1} if self.mode else set[int]()
         others = (self.point, self.point + 1, self.variant, self.mode, self.size, self.size + 1, self.angle)
         return {*range(DPR + self.way), *others} | shown
@@ -70,10 +70,10 @@ MILLING = {
 }
 
 ABSOLUTE, WAY_DOWN = 0, 1
-"""The last digit of AMODE; where there is DPR, 0 leaves it to the arguments, and 2 is for absolute."""
+"""Last digits of AMODE; for cycles with DPR, 0 leaves it to the arguments, and 2 means absolute."""
 CHAMFER = 5
 PLANES = {1: Z, 2: Y, 3: X}
-"""The last digit of DMODE, and the axis across the plane that it chooses."""
+"""Last digit of DMODE -> axis across the plane that it selects."""
 
 AT_RUN_TIME = "where and how deep {} works is known only at run time"
 NO_PLACE = "{} does not say where it works (PA, PO)"
@@ -88,24 +88,24 @@ OTHER_PLANE = "{} chooses another plane (DMODE) than the one in force"
 IN_DIAMETERS = "{} is called while X counts as a diameter"
 
 ALIKE = 1e-6
-"""Program units; two depths that differ by less are one."""
+"""Largest difference of equal depths, in program units."""
 
 
 @frozen
 class MillingCall:
-    """The numbers of a call, zero where nothing is written, and which arguments are written."""
+    """The numeric arguments of a call, zero if omitted, and the indices of those written."""
 
     form: MillingCycle
     numbers: list[float]
     written: frozenset[int]
 
     def digit(self, place: int, power: int = 0) -> int:
-        """A digit of an argument: 0 the last one, 2 that of the hundreds; zero where the cycle has no such argument."""
+        """A decimal digit of an argument, 10**power; zero if the cycle has no such argument."""
         return digit(self.numbers[place], power) if place > DP else 0
 
     @property
     def bottom(self) -> tuple[float, tuple[int, ...], str]:
-        """The height of the bottom, the arguments that are heights and lie at it, and what is wrong with them."""
+        """The height of the bottom, the indices of arguments that state this height, and a fault or ""."""
         mode, reference, deep = self.digit(self.form.mode), self.numbers[RFP], self.numbers[DP]
         way = self.numbers[DPR] if self.form.way else deep if mode == WAY_DOWN else 0.0
         by_way = mode == WAY_DOWN or (mode == ABSOLUTE and way != 0.0)
@@ -125,12 +125,12 @@ class MillingCall:
 
     @property
     def corners(self) -> tuple[bool, ...]:
-        """Of either axis, whether the size of a face is its opposite corner."""
+        """For each axis of the plane, whether the size of a face is given as its opposite corner."""
         return tuple(self.form.corner and self.digit(self.form.mode, power) == 1 for power in (2, 3))
 
     @property
     def points(self) -> tuple[tuple[int, int], ...]:
-        """The arguments that are places, and the axis of the plane of each; none where a contour says that."""
+        """Arguments of position, as (index, axis of the plane); none if a contour gives the place."""
         if self.form.named:
             return ()
         corners = [(self.form.size + axis, axis) for axis, own in enumerate(self.corners) if own]
@@ -138,7 +138,7 @@ class MillingCall:
 
     @property
     def place(self) -> tuple[float, float]:
-        """Where the cycle works: in the middle of a face, else at the place that the call names."""
+        """The place of the cycle in program units: the middle of a face, else the place that the call names."""
         x, y = self.numbers[self.form.point : self.form.point + 2]
         if not self.form.size:
             return x, y
@@ -149,12 +149,12 @@ class MillingCall:
 
 
 def digit(value: float, power: int = 0) -> int:
-    """A digit of a number: 0 the last one before its point, 2 that of the hundreds."""
+    """The decimal digit 10**power of a number."""
     return round(abs(value)) // 10**power % 10
 
 
 def said_in(control: Sinumerik, step: Calling) -> tuple[tuple[float | str | None, ...], bool]:
-    """The arguments of a call, None where one is left out or not known; and whether all that are written are known."""
+    """The arguments of a call, None if omitted or unknown; and whether all written ones are known."""
     pairs = zip(step.arguments, step.written, strict=True)
     values = [None if part is None else value(control) for value, part in pairs]
     known = tuple(None if isinstance(value, Unknown) else value for value in values)
@@ -162,7 +162,7 @@ def said_in(control: Sinumerik, step: Calling) -> tuple[tuple[float | str | None
 
 
 def milling_of(control: Sinumerik, step: Calling, *, modal: bool) -> Drilling:
-    """A milling cycle as it is called; an argument that is left out is zero."""
+    """The call of a milling cycle, evaluated; omitted arguments are zero."""
     form, name, first = MILLING[step.name], step.name.upper(), int(MILLING[step.name].named)
     said, sure = said_in(control, step)
     numbers = [
