@@ -1,4 +1,4 @@
-"""The walk through a program of the Fanuc family."""
+"""The interpreter of the Fanuc family: it executes the blocks of a program in the order of the control."""
 
 from __future__ import annotations
 

@@ -206,7 +206,7 @@ MITSUBISHI = replace(
 """Mitsubishi also mills circular pockets and drills patterns on its own, and numbers modal groups otherwise."""
 
 RULES = {"fanuc": FANUC, "haas": HAAS, "mitsubishi": MITSUBISHI}
-"""By `Dialect.semantics`."""
+"""The rules of each control, by `Dialect.semantics`."""
 
 BACK_BORING = 870
 """G87 goes down to R, and cuts upwards to its depth."""

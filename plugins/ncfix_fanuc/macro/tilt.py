@@ -2,17 +2,18 @@
 
 In a tilted plane, X Y Z are those of the tool tip in a frame that turns with the workpiece, whatever the rotary axes
 do: the control computes the linear axes from the tip, as under tool-centre-point control.
-The dynamic work offset of Haas (G254, G255) turns the work offset along with the tables as they stand. X Y Z are then
-those of the tip along the machine's axes, from the turned origin of the workpiece: the frame of a tilted plane to which
-the tool is square already.
+
+The dynamic work offset of Haas (G254, G255) turns the work offset with the tables, by their present angles. X Y Z are
+then those of the tip along the machine's axes, from the turned origin of the workpiece. That is the frame of a tilted
+plane to which the tool is already square.
 
 The vector I J K of G43.5 points from the tip to the spindle, in the coordinates of the program, and may have any
 length. A component that is not written is zero; a block without any keeps the direction. Parameters of the control
 decide which of two ways the rotary axes take; here it is the nearest.
 Sources: Fanuc 30i operator's manual (machining centre), "Tilted working plane indexing"; Fanuc, "Tool center point
-control for 5-axis machining" (A-79348E), type 2; Mazak, "Inclined-plane machining" (roll, pitch and yaw). That the
-first of three points is the origin, and that the block Q0 shifts it from there, is what programs for these controls say
-of themselves; Haas, "Next Generation Control, mill operator's manual".
+control for 5-axis machining" (A-79348E), type 2; Mazak, "Inclined-plane machining" (roll, pitch and yaw). Haas,
+"Next Generation Control, mill operator's manual". That the first of three points is the origin, and that the block Q0
+shifts it from there, is taken from descriptions in programs for these controls.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ class Deviations(Expected):
         unit = float(self.ours.unit[self.ours.at[pair.row]])
         most = 2.1 * float(self.control_halves(unit).max())  # both numbers are rounded
         if self.first.family is Family.WORDS:
-            most += self.tolerance  # where a hole begins (R) cuts nothing
+            most += self.tolerance  # the level R does not cut
         return len(its) != 1 or not call.differs_in_depth_only(its[0], most / unit)
 
     def gaps(self, meant: Array, done: Array, rows: Index, given: PoseColumns) -> Array:

@@ -138,7 +138,7 @@ class Expected:
         self.directions = np.where(last >= 0, np.take_along_axis(np.where(moves, signs, 0), last, axis=0), 0)
         placed = np.array([name in self.given.initial for name in self.machine.axis_names])
         moved = np.logical_or.accumulate(moves, axis=0)
-        placed_before = np.vstack([placed[None], placed | moved[:-1]])  # else their positions were only assumed
+        placed_before = np.vstack([placed[None], placed | moved[:-1]])  # other positions were only assumed
         breaks = lost[:, None] | ~clear | (moves & ~placed_before)
         last = np.maximum.accumulate(np.where(moves | breaks, index, -1), axis=0)
         sure = (last < 0) | ~np.take_along_axis(breaks, last, axis=0)

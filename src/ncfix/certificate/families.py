@@ -144,7 +144,7 @@ class WordAddressFollower(AxisFollower):
                 self.local |= numbers
             case [920] if numbers and not any(math.isnan(self.at[axis]) for axis in numbers):
                 for axis, value in numbers.items():
-                    self.local[axis] = self.shifts[axis] = 0.0  # the place gets its number whatever was in force
+                    self.local[axis] = self.shifts[axis] = 0.0  # the place gets this number, whatever was in force
                     self.shifts[axis] = self.at[axis] - value - self.offset(axis)
                 self.unsay(tuple(numbers))
             case [921] if not numbers and not any(self.local.values()):
@@ -367,7 +367,7 @@ class WordAddressFollower(AxisFollower):
                 case "T":
                     self.next_tool = word.number.strip('"').upper() if word.value is None else int(word.value)
                     if self.family is Family.SINUMERIK:
-                        self.tool = self.next_tool  # in the spindle; its length holds at once where one was in force
+                        self.tool = self.next_tool  # put into the spindle; its length acts at once if one is in force
                         self.choose_edge(1)
                         self.unsay()
                 case "D" if self.family is Family.SINUMERIK:
@@ -423,7 +423,7 @@ class WordAddressFollower(AxisFollower):
         if self.turn is not None and self.turn.tilted:
             self.forget_place("XY" if self.is_square() else "")  # the tip moves along the tool
         elif self.tcp and (tcp or self.given.tcp):
-            self.at.update(dict.fromkeys("XYZ", NAN))  # the same place has other numbers for another tool
+            self.at.update(dict.fromkeys("XYZ", NAN))  # with another tool, the same place has other numbers
         self.tool, self.between = tool, False
         self.lead(tcp)
         self.new_length(self.length_of(tool))
@@ -448,7 +448,7 @@ class WordAddressFollower(AxisFollower):
         """The step of a hole by a drilling cycle of word addresses: in G17, with absolute words."""
         if self.counting or self.plane != 17 or line.code("K") or line.code("L") or line.word("I") or line.word("K"):
             step = self.step(row, Kind.HOLE, dict(self.at), line, "a drilling cycle that this reader does not know")
-            step.foreign = True  # one that is repeated may be written out
+            step.foreign = True  # a correction may write a repeated one out
             return step
         for name in "ZR":
             word = line.word(name)
@@ -462,7 +462,7 @@ class WordAddressFollower(AxisFollower):
         level = self.cycle.get("R", NAN)
         back = level
         if not self.returns_to_level and not level >= self.before_cycle:
-            # before G98 or G99 the control has its own way back
+            # until G98 or G99 is programmed, each control has its own way back
             back = NAN if self.returns_to_level is None else self.before_cycle
         if not step.why and not math.isnan(level):
             zero = self.offset("Z")

@@ -147,7 +147,7 @@ class AxisFollower(FollowedAxes):
 
     def _line(self, row: int, line: TextLine) -> AxisStep | None:
         """Follow one line, and log its step."""
-        behind = self.ended and not (line.path or line.codes)  # the last % stays
+        behind = self.ended and not (line.path or line.codes)  # the last % is kept
         if line.odd or (not behind and self.is_rewritten):
             self.foreign.add(row)
         if line.skipped and self.given.skip is None:
@@ -216,7 +216,7 @@ class AxisFollower(FollowedAxes):
         """The line with formulas replaced by their values, if the variables in them are known."""
         if line.plain or all(word.value is not None for word in line.path):
             return line
-        given_here = {word.name for word in line.codes}  # whether the old or the new value counts is not sure
+        given_here = {word.name for word in line.codes}  # the path may use the old or the new value
         known = {name: value for name, value in self.variables.items() if name not in given_here}
         values = (word.value if word.value is not None else value_of(word.number, known) for word in line.path)
         path = [

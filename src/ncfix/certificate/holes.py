@@ -68,7 +68,7 @@ class HoleCall(NamedTuple):
         if way and reference is not None:
             deep = reference - way if clear >= reference else reference + way
         assert deep is not None
-        said = {DP: 1, DPR: -1} | FIRST_DEPTH.get(number, {})  # a way of zero is none
+        said = {DP: 1, DPR: -1} | FIRST_DEPTH.get(number, {})  # a way of 0 counts as not given
         given = {at: values[at] for at in said if at < len(values)}
         depths = {at: said[at] for at, value in given.items() if value is not None and (value or said[at] > 0)}
         return cls(name.strip(), values, depths, deep, clear)

@@ -219,5 +219,5 @@ class Ways:
             turn = np.arctan2(b[each, two], b[each, one]) - np.arctan2(a[each, two], a[each, one])
             whole, sweep = 2 * np.pi, np.abs(self.sweep[here])
             turn = np.where(self.sweep[here] > 0, turn, -turn) % whole
-            share[on] = np.where(turn > (sweep + whole) / 2, turn - whole, turn) / sweep  # just before it begins
+            share[on] = np.where(turn > (sweep + whole) / 2, turn - whole, turn) / sweep  # below 0: before it begins
         return share

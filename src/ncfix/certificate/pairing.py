@@ -234,7 +234,7 @@ class Pairing:
             return last + (self.moves(row) and self._puts_back(last + 1, following))
         feed = not behind.path and following.path != []
         pole = _begins(behind, "CC") and _begins(ours[row], *ARCS)
-        return last + (feed or (pole and not _begins(following, "CC", *ARCS)))  # a pole before an arc belongs to that
+        return last + (feed or (pole and not _begins(following, "CC", *ARCS)))  # a pole before an arc is the arc's
 
     def _puts_back(self, at: int, following: TextLine) -> bool:
         """Whether line `at`, which calls a hole or sets its depth, restores the state behind the hole before it."""
@@ -375,7 +375,7 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> lis
     klartext = family is Family.KLARTEXT
     turned = _begins(head, "CC") or (_begins(head, "CP") and not _begins(line, "CP"))
     if klartext and arc and (split or turned):
-        return found  # of other words than before
+        return found  # its words may differ from the original ones
     free = [LATE[family]] if split else []
     if arc or (klartext and _begins(line, "CC")):
         free.append(MOTION.get(family, MOTION[Family.WORDS]))

@@ -136,7 +136,7 @@ def _piece(text: str, start: int) -> str:
 
 
 SKIPPED = re.compile(r"[ \t]*(?:N[ \t]*\d+[ \t]*)?/(\d?)", re.IGNORECASE)
-"""The mark of block delete with its switch, at the begin of a line or behind its number."""
+"""The mark of block delete with its switch, at the start of a line or behind its number."""
 
 
 def _marked(number: int, text: str) -> tuple[TextLine, int]:

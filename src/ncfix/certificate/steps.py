@@ -227,7 +227,7 @@ class ProgramSteps(Mapping[int, AxisStep]):
         self.tcp, self.foreign, self.unsaid, self.unsteady, self.by_vector = (np.zeros(most, bool) for _ in range(5))
         self.length, self.feed, self.unit = np.empty(most), np.empty(most), np.empty(most)
         self.feed_mode, self.across = np.empty(most, dtype=np.int16), np.zeros(most, dtype=np.int8)
-        self.centre, self.sweep = np.zeros((most, 3)), np.zeros(most)  # memory is taken where there are arcs
+        self.centre, self.sweep = np.zeros((most, 3)), np.zeros(most)  # zeros take no memory unless there are arcs
         self.turn, self.rotations = np.zeros(most, dtype=np.int32), np.eye(3)[None]
         self._reason_of = {"": 0}
 

@@ -276,7 +276,7 @@ class Lines(Sequence[TextLine]):
                 digits = [each.replace(",", ".") for each in digits]
             try:
                 return pieces, np.fromiter(map(float, digits), np.float64, len(digits))
-            except ValueError:  # some of it is no number: signs or points by themselves
+            except ValueError:  # some matches are not numbers: a sign or a point alone
                 continue
         raise AssertionError("what these patterns match are numbers")
 

@@ -143,7 +143,7 @@ class Corrector:
     watch: Watch | None = None
 
     def stamp(self) -> bytes:
-        """The stamp by what is known now: parts after the first may have added to it."""
+        """The stamp as it would be written now; parts after the first may add to it."""
         assert self.head is not None
         return stamp.insertion(self.head, stamp_of(self.head, self.task.machine, self.task.options, *self.said())).text
 
@@ -231,7 +231,7 @@ class Fixed:
     """The corrected program, whether it differs from the original, and the report.
 
     lines  for a program that was written out flat: the original line number of each of its lines; else empty
-    made   what it was corrected with; None for a machine without errors
+    made   the conditions of the correction; None for a machine without errors
     """
 
     text: bytes

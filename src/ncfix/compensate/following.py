@@ -1,11 +1,11 @@
 """A program followed on a machine, with workpiece and tool lengths, and whether it was corrected before.
 
-A corrected program carries a stamp. If the stamp is gone, the numbers still tell: people and CAM systems write round
-numbers, and a correction makes them crooked. If the coordinates of a program are crooked, and become round when the
-errors of this machine are added to them, then the program was written for these errors. Correcting it again would apply
-the correction twice, which leaves an error as large as the original one, and no later check would show it. A number is
-round here if it lies within one least increment of a grid that is ten times coarser. In a program whose numbers use all
-digits, by chance as many numbers become round as cease to be; such a program is not suspected.
+A corrected program carries a stamp. If the stamp is gone, its numbers still show the correction: people and CAM systems
+write round numbers, and a correction makes them crooked. If the coordinates of a program are crooked, and become round
+when the errors of this machine are added to them, then the program was corrected for these errors. Correcting it again
+would apply the correction twice, which leaves an error as large as the original one, and no later check would show it.
+A number is round here if it lies within one least increment of a grid that is ten times coarser. In a program whose
+numbers use all digits, by chance as many numbers become round as cease to be; such a program is not suspected.
 """
 
 from __future__ import annotations

@@ -400,8 +400,8 @@ class PartProof:
         """See `driver.Proof.misreadings`.
 
         A motion that is left unchanged may end elsewhere because a motion before it was corrected. Then the part is
-        planned once more with this reading. The text must come out the same, because the follower has passed it already
-        and cannot go back.
+        planned once more with this reading. The text must not change, because the follower has passed it already and
+        cannot go back.
         """
         (solution,), head, misread = joint.plans, continued.head, self.misread
         own = None if head is None else solution.plan.pieces.move > 0

@@ -111,7 +111,7 @@ MIN_MOTIONS_PER_ODD = 16
 
 @frozen
 class MorePieces:
-    """The pieces of some motions.
+    """The pieces of motions that are split.
 
     rows    (k,) the motions, in order
     counts  (k,) number of pieces of each motion

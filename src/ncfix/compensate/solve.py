@@ -299,7 +299,7 @@ class Planning:
                 shift = head.shift[at]
             unchanged, reaches_back = _with_what_they_need(moves, unchanged, bound, reasons)
             planned = plan(self.intent, self.strategy, self.required, unchanged, shift)
-            if len(moves):  # of the last one
+            if len(moves):  # keep the state of the last motion
                 off = planned.start[-1] - moves.start[-1]
                 history.append((bool(planned.pieces.unchanged[-1]), np.where(np.isfinite(off), off, 0.0)))
             planned = replace(planned, pieces=on_digits(self.intent, planned.pieces, held=self.held))
@@ -446,7 +446,7 @@ def differences(solution: WrittenPlan, again: Moves, own: Mask | None = None) ->
         return differs
     off = again.centre[arcs] - emission.centre[rows[arcs]]
     off[np.isnan(again.centre[arcs]) & np.isnan(emission.centre[rows[arcs]])] = 0.0
-    off = across(off, again.normal[arcs])  # the height of a centre means nothing
+    off = across(off, again.normal[arcs])  # along the normal, a centre has no meaning
     differs[arcs[differ(off, np.zeros_like(off))]] = True
     sweeps = solution.moves.sweep[pieces.move] * (pieces.fraction - pieces.begun)  # the piece's share of its motion
     differs[arcs] |= np.abs(again.sweep[arcs] - sweeps[rows[arcs]]) > TURN

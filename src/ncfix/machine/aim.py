@@ -1,7 +1,7 @@
 """The gap between actual and intended tool tip, and the linear axis positions that bring the tip to a point.
 
-The positions are found by Newton's method on the exact model. The derivative is that of the machine without errors:
-these change it by parts in ten thousand only, so each pass gains about four digits.
+The positions are found by Newton's method on the exact model. The derivative is that of the machine without errors,
+which change it by parts in ten thousand only; so each pass gains about four digits.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Aim:
         return cls(np.empty((3, n)), np.empty(n, dtype=np.bool_), np.empty(n))
 
     def put(self, rows: slice | Index, other: Aim) -> None:
-        """Write the result of some poses."""
+        """Put the results of poses `rows` in place."""
         self.place[:, rows], self.arrived[rows], self.off[rows] = other.place, other.arrived, other.off
 
 

@@ -1,4 +1,4 @@
-"""What the message codes of the machine floor mean: machine files (NCF300 ... NCF324) and states (NCF340)."""
+"""The meanings of the message codes of machine files (NCF300 to NCF324) and of states (NCF340)."""
 
 from __future__ import annotations
 

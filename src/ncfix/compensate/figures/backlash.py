@@ -36,7 +36,7 @@ class Runs:
     size   (k,) way of the axis in the run, mm or rad
     way    (k,) direction of the axis in the run, -1, 0 or 1
     lost   (k,) lost motion: way until the play is taken up after a reversal, mm or rad; 0 without play
-    side   (k,) place of the body between the sides of the play at the begin of the run, -1 to 1
+    side   (k,) place of the body between the sides of the play at the start of the run, -1 to 1
     """
 
     begin: Index
@@ -233,7 +233,7 @@ WINDOW = 24
 class Flank:
     """The other possible place of the tip near reversals, on a path of k parabolas.
 
-    aside  (k, 3, 3) vector, mm, from the tip to its place with the reversing axes on their other side, at the begin,
+    aside  (k, 3, 3) vector, mm, from the tip to its place with the reversing axes on their other side, at the start,
            middle and end of each parabola; 0 away from reversals, and for axes with play to take up
     """
 

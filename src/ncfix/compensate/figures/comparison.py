@@ -182,7 +182,7 @@ UNLIKE = 0.02
 AT_HAND = 100.0
 """Length of path, mm, that is held before and behind a place: enough for all deviations below 2 mm."""
 GROUP = 2048
-"""Number of parabolas that are compared together. Groups are counted from the begin of the path, so that the result
+"""Number of parabolas that are compared together. Groups are counted from the start of the path, so that the result
 does not depend on the parts in which it is read."""
 
 
@@ -256,7 +256,7 @@ class Match:
     along  the distances so far, as errors along the path
     done   number of parabolas of the path that have been compared
     ahead  length of the other path minus that of the path at the end of these, mm
-    last   the nearest place of the other path to that end, its parabolas counted from the begin of that path
+    last   the nearest place of the other path to that end, its parabolas counted from the start of that path
     """
 
     path: Track

@@ -200,7 +200,7 @@ class Curve:
 
     @cached_property
     def gaps(self) -> Array:
-        """(k,) the gap between the end of the parabola before and the begin of each, mm."""
+        """(k,) the gap between the end of the parabola before and the start of each, mm."""
         gaps = np.zeros(len(self))
         at = np.flatnonzero(self.opens[1:]) + 1
         gaps[at] = distance(self.end[at - 1], self.begin[at])
@@ -208,7 +208,7 @@ class Curve:
 
     @cached_property
     def lengths(self) -> Array:
-        """(k,) the length of the path up to the begin of each parabola, with straight lines over gaps, mm."""
+        """(k,) the length of the path up to the start of each parabola, with straight lines over gaps, mm."""
         return self.first + np.cumsum(self.ways + self.gaps) - self.ways
 
     @property
@@ -218,7 +218,7 @@ class Curve:
 
     @cached_property
     def slope(self) -> Array:
-        """(k, 3) derivative of the point by the parameter u at the begin of each parabola, mm; see `bend`."""
+        """(k, 3) derivative of the point by the parameter u at the start of each parabola, mm; see `bend`."""
         return 4 * self.middle - 3 * self.begin - self.end
 
     @cached_property
@@ -228,7 +228,7 @@ class Curve:
 
     @cached_property
     def turns(self) -> Array:
-        """(2, k) lower bound of the turn of the path up to the begin, and up to the end, of each parabola, rad."""
+        """(2, k) lower bound of the turn of the path up to the start, and up to the end, of each parabola, rad."""
         enters, leaves = _unit(self.slope), _unit(self.slope + 2 * self.bend)
         inside = distance(enters, leaves)
         corner = np.zeros(len(self))

@@ -38,7 +38,7 @@ STRAIGHT = 0.1
 """Turn of a path, rad, below which it leads no nearer to a point: the gain is at most 1 - cos, half a per cent."""
 INSIDE = 1e-6
 """Distance from the ends of a parabola, as a share of it, because the search from its end may find another point than
-that from the begin of the next one."""
+that from the start of the next one."""
 SUDDEN = 0.5
 """Sudden change of the difference of lengths, mm, at which a group of points is divided to find its place."""
 FEWEST = 16
@@ -183,7 +183,7 @@ class Search:
         return found
 
     def _at_gap(self, piece: Index, share: Array) -> Array:
-        """(n,) 1 at the end of a cut, -1 at the begin of one, 0 elsewhere."""
+        """(n,) 1 at the end of a cut, -1 at the start of one, 0 elsewhere."""
         opens = self.curve.opens
         ends = (share == 1) & opens.take(piece + 1, mode="clip")
         return 1.0 * ends - ((share == 0) & opens[piece])
@@ -249,7 +249,7 @@ def _newton(curve: Curve, points: Array, piece: Index, share: Array) -> tuple[Ar
     """The nearest places to `points` (3, n) on parabolas `piece` (n,), by Newton steps from shares (n,).
 
     Returns the shares, the distances, mm, and how far the foot of the point lies beyond the end, mm: negative before
-    the begin, 0 if it is on the parabola.
+    the start, 0 if it is on the parabola.
     """
     begin, slope, bend = curve.parabolas.take(piece, axis=1).reshape(3, 3, -1)
     points = points - begin
@@ -330,7 +330,7 @@ class NearestInterval:
 
     piece             (n,) the parabola
     low, high         (n,) the shares of it at which the interval begins and ends
-    before, behind    the nearest places to the begin, and to the end
+    before, behind    the nearest places to its start, and to its end
     """
 
     piece: Index

@@ -292,9 +292,7 @@ def _bent(written: WrittenPieces, which: Index) -> tuple[Index, Array]:
     counts = np.where(drawn, np.minimum(np.ceil(np.nan_to_num(turned) / STEP), MOST_STEPS), 0).astype(np.intp)
     counts = np.maximum(counts - 1, 0)
     inside = which[owners(counts)], even(counts)
-    first = np.flatnonzero(
-        np.diff(moves.kind[move], prepend=-1) != 0
-    )  # where a rapid has led a cut, and where all begins
+    first = np.flatnonzero(np.diff(moves.kind[move], prepend=-1) != 0)  # starts of runs of one kind
     first = first[drawn[first] & np.isfinite(picked(segments.start, which[first])).all(axis=1)]
     return np.concatenate([which[first], inside[0]]), np.concatenate([np.zeros(len(first)), inside[1]])
 

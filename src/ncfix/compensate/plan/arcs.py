@@ -76,7 +76,7 @@ def _fitted(intent: Intent, standing: Segments, rows: Index, closure: Closure, r
     ends = arcs.start[:, intent.columns], arcs.end[:, intent.columns]
     programmed, wanted = _corrected_path(intent, standing, rows)
     mean = intent.moves.centre[rows] + (wanted - programmed).mean(axis=1).T
-    centre = arcs.centre + across(mean - arcs.centre, arcs.normal)  # the height of a centre means nothing
+    centre = arcs.centre + across(mean - arcs.centre, arcs.normal)  # along the normal, it has no meaning
     closed = full_circles(intent, rows) & (np.linalg.norm(across(ends[1] - ends[0], arcs.normal), axis=1) < CLOSED)
     centre = np.where(closed[:, None], centre, _onto_bisector(*ends, arcs.normal, centre))
     best = _best_on_bisector(arcs, ends, centre, wanted)
@@ -99,9 +99,9 @@ def full_circles(intent: Intent, rows: Index) -> Mask:
 
 
 def _corrected_path(intent: Intent, real: Segments, rows: Index) -> tuple[Array, Array]:
-    """(3, looks, k) X Y Z as programmed at `LOOKS` of each arc, and as wanted by the correction, mm.
+    """(3, looks, k) X Y Z as programmed at `LOOKS` of each arc, and as the correction should place them, mm.
 
-    An axis that gets no word is wanted where it goes anyway: its programmed way, from where it stands.
+    An axis that gets no word should be where it is without a correction: on its programmed way, from where it stands.
     """
     each, at = np.tile(rows, len(LOOKS)), np.repeat(LOOKS, len(rows))
     commands, chords = (

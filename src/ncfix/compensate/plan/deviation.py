@@ -179,7 +179,7 @@ def distance(intent: Intent, real: Segments, rows: Index, fraction: Array) -> Ar
 
 
 def beside(intent: Intent, real: Segments, rows: Index) -> Array | None:
-    """(n, n_axes) largest distance of axes that get no word from where they should be inside motions `rows` (k,), mm.
+    """(n, n_axes) largest distance of axes without a word from their intended places inside motions `rows` (k,), mm.
 
     0 for all other axes and motions; the ends of motions are not included. None if there are no such axes.
     """

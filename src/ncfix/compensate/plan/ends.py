@@ -53,7 +53,7 @@ def standing(
     before: Array | None = None,
     approaches: Array | None = None,
 ) -> EndCommands:
-    """Where each motion really starts and ends. Axes that must get no word stay where they stand.
+    """The commands at which each motion really starts and ends. Axes that must get no word stay where they stand.
 
     wanted      (n, n_axes) corrected commands at the ends of the motions
     unchanged   (n,) motions that are left as they are, whatever `wanted` says

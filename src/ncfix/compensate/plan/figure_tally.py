@@ -30,7 +30,7 @@ class PathError:
 
     before, after  figures over all sampled motions
     samples        number of samples
-    way            length of path that they stand for, mm
+    way            length of path that the samples represent, mm
     """
 
     before: Figures
@@ -41,7 +41,7 @@ class PathError:
 
 @frozen
 class PathSamples:
-    """Samples on a path, flat: motion, fraction, tip error before and after, mm, and the way they stand for, mm."""
+    """Samples on a path, flat: motion, fraction, tip error before and after, mm, and the length each represents, mm."""
 
     move: Index
     fraction: Array

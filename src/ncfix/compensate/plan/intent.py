@@ -43,7 +43,7 @@ from ncfix.machine import Machine, State
 from ncfix.values import frozen
 
 INSTANT, WHILE = 1e-4, 1e-3
-"""Fractions of a motion by which the direction of its axes is found: around an instant, and for a while before it."""
+"""Fractions of a motion over which the direction of its axes is taken: around an instant, and before it."""
 NOISE = 1e-11
 """Largest difference, mm or rad, of axis positions by rounding of the arithmetic."""
 

@@ -1,15 +1,15 @@
 """Commands and axis positions with tool-centre-point control (TCP), and axis positions that bring the tip to a point.
 
-Without TCP a command is the axis positions. With it, X Y Z of a command are the place of the tool tip in the workpiece:
-the one where the tip would be if the linear axes had the commanded values, the rotary axes stood at zero and the tool
-had no length. (So with all rotary axes at zero, X Y Z mean the same with and without TCP.) The control finds the linear
+Without TCP a command is the axis positions. With it, X Y Z of a command define the place of the tool tip in the
+workpiece: the tip would be there if the linear axes had these values, the rotary axes stood at zero, and the tool had
+no length. (So with all rotary axes at zero, X Y Z mean the same with and without TCP.) The control finds the linear
 axis positions that bring the tip there with the rotary axes at their commanded positions. While nothing else moves, the
-tip is a linear function of X Y Z, so three linear equations are solved. On an erroneous machine, `steer` finds the
+tip is a linear function of X Y Z, so three linear equations are solved. On a machine with errors, `steer` finds the
 positions by Newton's method on the exact model.
 
 Directions of motion are those of the program on a perfect machine: the sign of each axis's motion or, for an axis at
-rest, its last direction. Corrections move axes to and fro by micrometres; an axis that rests in the program is taken to
-keep the side of its play.
+rest, its last direction. Corrections move axes to and fro by micrometres; an axis that rests in the program is assumed
+to stay on the same side of its play.
 """
 
 from __future__ import annotations

@@ -23,9 +23,10 @@ JUMP = 0.05
 RATE_TURNING = 1.0
 """Largest change of a correction per turn of a rotary axis, mm/rad: 100 um in a tenth of a radian."""
 LOOKS = 64
-"""Number of stretches between samples of a curved motion, by which places are found where an axis turns back."""
+"""Number of stretches into which a curved motion is divided to find the places where an axis turns back."""
 NEAR = 8
-"""Samples closer to a limit than this part (1/8) of the way of the axis: the axis may pass it in between (14 turns)."""
+"""If a sample is closer to a limit than the travel of the axis in the motion divided by this, the axis may pass the
+limit between samples. That holds for motions of up to 14 turns."""
 PLACES = 8
 """Number of inner points per step of the search: each step shrinks the bracket to 2/9."""
 STEPS = 16
@@ -172,7 +173,7 @@ def _highest(function: Callable[[Index, Array], Array], low: Array, high: Array)
         found = function(np.repeat(searched, PLACES), places.ravel()).reshape(places.shape)
         rows, best = np.arange(len(found)), found.argmax(axis=1)
         highest[searched] = np.maximum(highest[searched], found[rows, best])
-        rise = 2 * np.abs(np.diff(found, axis=1)).max(axis=1)  # between two places, with some to spare
+        rise = 2 * np.abs(np.diff(found, axis=1)).max(axis=1)  # bound of the rise between two places
         may = ~(highest[searched] + rise < 0)
         middle, step, searched = places[rows, best][may], step[may], searched[may]
         low, high = middle - step, middle + step

@@ -129,9 +129,10 @@ def _shares(pieces: Pieces, real: Segments, counts: Index) -> Array:
 
 
 SAMPLED = 0.02
-"""Share of the tolerance held back for what happens between samples. Samples stand at least `DENSITY` to the shortest
-distance over which the model bends, an eighth of a wave: a wave's peak between two of them rises above the higher by
-less than 1 - cos(pi / 32) = 0.5 % of its height, and a parabola's over its chord by less than 1 / 64 of the arrow."""
+"""Share of the tolerance that is kept for errors between samples. There are at least `DENSITY` samples in the shortest
+distance over which the model bends, an eighth of a wave. The peak of a wave between two samples exceeds the higher of
+them by less than 1 - cos(pi / 32) = 0.5 % of its height, and that of a parabola its chord by less than 1 / 64 of the
+parabola's height."""
 
 
 @frozen

@@ -32,11 +32,10 @@ def features(machine: Machine) -> Array:
 
 
 def bends(intent: Intent, rows: Index) -> Array:
-    """(k,) about how many times the error may bend along each motion: the ways of all axes over their `features`.
+    """(k,) estimated number of bends of the error along each motion: the ways of all axes, each over its `features`.
 
     Without tool-centre-point control the ways are those of the commands; on arcs, those along the arc. With it, the
-    linear axes also make the way of swinging the tip: up to the distance of the tip from the rotary axes times the
-    angle.
+    linear axes also follow the swinging tip: by up to its distance from the rotary axes times the angle.
     """
     moves, machine = intent.moves, intent.machine
     way = np.abs(picked(moves.end, rows) - picked(moves.start, rows))

@@ -6,9 +6,10 @@ removed. They occur where an error jumps: a motion is split on both sides of the
 jump may be smaller than an output step.
 
 The effect of rounding on the path comes on top of the tolerance. Every number is off by up to half an output step. At
-the end of a motion that is half a step in each linear axis. Along an arc its centre is off, too: in the middle of a
-turn by `a` that counts 1 - cos(a / 2) times, twice on a full circle. If a rotary axis turns during a piece, the lever
-arm of the tool differs from that at the ends, and half a step of the axis counts by the change of this arm.
+the end of a motion, that is half a step in each linear axis. The centre of an arc is off, too: in the middle of an arc
+of angle a, the path is off by the error of the centre times 1 - cos(a / 2), twice the error on a full circle. If a
+rotary axis turns during a piece, the lever arm of the tool differs from that at the ends, and the path is off by half a
+step of the axis times the change of this arm.
 """
 
 from __future__ import annotations
@@ -106,8 +107,8 @@ class Known:
     """Tip errors at the ends of motions, known from their correction on the exact model.
 
     before  (n,) tip error without correction, mm; NaN if not known
-    end     (n, n_axes) commands at which the tip is where it should be, to 1 nm
-    beside  (n, n_axes) largest distance, mm, along the motion, of an axis that gets no word from where it should be; 0
+    end     (n, n_axes) commands at which the tip is at its intended place, to 1 nm
+    beside  (n, n_axes) largest distance, mm, during the motion, of an axis without a word from its intended place; 0
             for all other axes. None: there are no such axes
     """
 
