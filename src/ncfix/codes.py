@@ -1,4 +1,4 @@
-"""What the message codes of the ground floor mean: files and arguments (NCF002 ... NCF025), plugins (NCF5xx)."""
+"""Message codes of the basic modules: files and arguments (NCF002 ... NCF025), plugins (NCF5xx)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the message codes of the command line mean."""
+"""Message codes of the command line."""
 
 from __future__ import annotations
 

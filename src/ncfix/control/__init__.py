@@ -1,1 +1,1 @@
-"""The control while it follows a program: where the axes stand, what is in force, and the motions that come of it."""
+"""Model of a control that executes a program: positions, modal state, and the motions that the program makes."""

@@ -1,4 +1,4 @@
-"""The codes of following a program (2xx) and of the files that say what is on the machine (38x)."""
+"""Message codes of interpreting a program (2xx) and of the setup files (38x)."""
 
 from __future__ import annotations
 

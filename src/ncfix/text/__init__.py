@@ -1,1 +1,1 @@
-"""NC programs as text: what is read without loss, its tree, numbers and shapes; no meaning of any control."""
+"""NC programs as text: lossless reading, syntax tree, numbers and block shapes. Nothing here depends on a control."""

@@ -1,4 +1,4 @@
-"""The codes of reading programs: 1xx."""
+"""Message codes of reading programs: 1xx."""
 
 from __future__ import annotations
 

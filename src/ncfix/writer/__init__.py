@@ -1,1 +1,1 @@
-"""Corrected motions put into the text of a program: which bytes change, and the proof that nothing else does."""
+"""Writing corrected motions into the text of a program, and proof that nothing else in the text changes."""

@@ -1,6 +1,6 @@
-"""Blocks of plain numbers as columns: where shapes have their numbers, what blocks say, and where they lead.
+"""Blocks of plain numbers as columns: the slots of their numbers, their codes and feeds, and the path they describe.
 
-That is found of one stretch, or of many ahead at once.
+A stretch is evaluated on its own, or together with many blocks after it.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from ncfix.values import frozen, mutable
 
 Shapes = NDArray[np.int32]
 Before = tuple[float, float, float]
-"""What the number of an F word counts; feed and motion code in force before."""
+"""mm per unit of an F word (1 under inverse time feed); the feed and the motion code in force before the blocks."""
 
 LONGEST = 1 << 16
-"""Blocks that are taken at once."""
+"""Largest number of blocks evaluated at once."""
 
 
 @frozen
 class Lane:
-    """A block that is nothing but a straight motion, or an arc, with plain numbers.
+    """A block that is only a straight motion or arc with plain numbers. A slot is the index of a number in the block.
 
     axes    pairs of letter index and slot
-    feed    slot of F, -1 without
-    motion  0, 10, 20, 30, or -1 if the code in force stays
-    centre  slots of I, J and K, -1 without
-    radius  slot of R, -1 without
-    fixed   which of I, J and K count from the origin, whatever else is in force
+    feed    slot of F, -1 without F
+    motion  motion code in tenths (0, 10, 20, 30); -1: the code in force remains
+    centre  slots of I, J and K, -1 without the word
+    radius  slot of R, -1 without R
+    fixed   whether I, J and K count from the origin, in whatever mode
     """
 
     axes: tuple[tuple[int, int], ...]
@@ -49,22 +49,22 @@ class Lane:
 
     @property
     def turns(self) -> bool:
-        """Whether it is an arc."""
+        """Whether the block is an arc."""
         return self.radius >= 0 or max(self.centre) >= 0
 
 
 @frozen
 class LaneTables:
-    """The lanes of all shapes as columns; -1 for what a shape lacks, and for all of a shape that has no lane.
+    """The lanes of all block shapes as columns; -1 for a missing word, and throughout for a shape without a lane.
 
-    axes    (s, 9) which number of a block is the word of an axis
-    feed    (s,) which one is F
+    axes    (s, 9) slot of the word of each axis
+    feed    (s,) slot of F
     motion  (s,) motion code in tenths
     mask    (s,) axis words, as bits
-    centre  (s, 3) which ones are I, J and K
-    radius  (s,) which one is R
-    fixed   (s, 3) which of I, J and K count from the origin
-    turns   (s,) arcs
+    centre  (s, 3) slots of I, J and K
+    radius  (s,) slot of R
+    fixed   (s, 3) whether I, J and K count from the origin
+    turns   (s,) whether the block is an arc
     """
 
     axes: Ints
@@ -78,7 +78,7 @@ class LaneTables:
 
     @classmethod
     def of(cls, lanes: Sequence[Lane | None]) -> LaneTables:
-        """The tables of some lanes."""
+        """Make the tables from one lane per shape."""
         n = len(lanes)
         nowhere, none = np.full((n, N_LETTERS), -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
         turns = np.array([lane is not None and lane.turns for lane in lanes], dtype=np.bool_)
@@ -96,26 +96,26 @@ class LaneTables:
 
 
 class ProgramText(Protocol):
-    """A program text while it is executed."""
+    """A program text that is being executed."""
 
     @property
     def program(self) -> Program:
-        """The program whose text it is."""
+        """The program of this text."""
 
     @property
     def lanes(self) -> LaneTables:
-        """The lanes of all shapes as columns."""
+        """The lanes of all block shapes."""
 
 
 @frozen
 class BlockRows:
-    """Consecutive blocks as the control takes them, one row per block.
+    """Consecutive blocks evaluated as the control executes them, one row per block.
 
-    path    (n + 1, 9) the command before the first block, and at the end of each
-    feed    (n,) feed in force, mm/min, 1/min or mm/rev; `fed` where the block has an F
-    motion  (n,) motion code in force, in tenths; `coded` where the block has one
+    path    (n + 1, 9) commanded position before the first block and at the end of each block
+    feed    (n,) feed in force, mm/min, 1/min or mm/rev; `fed`: the block has an F word
+    motion  (n,) motion code in force, in tenths; `coded`: the block has a motion code
     mask    (n,) axis words, as bits
-    turns   (n,) arcs; None: no block can be one
+    turns   (n,) whether the block is an arc; None: no block is
     """
 
     path: Array
@@ -127,14 +127,14 @@ class BlockRows:
     turns: Mask | None = None
 
     def rows(self, start: int, stop: int) -> BlockRows:
-        """Some of the blocks."""
+        """The blocks from `start` to before `stop`, as views."""
         own = slice(start, stop)
         path = self.path[start : stop + 1]
         turns = None if self.turns is None else self.turns[own]
         return BlockRows(path, self.feed[own], self.fed[own], self.motion[own], self.coded[own], self.mask[own], turns)
 
     def only(self, moving: Mask) -> BlockRows:
-        """The blocks that move anything, (n,): the others lead nowhere."""
+        """The blocks that make a motion (`moving`, (n,)); the others do not change the position."""
         if moving.all():
             return self
         path = np.concatenate((self.path[:1], self.path[1:].compress(moving, axis=0)))
@@ -143,7 +143,7 @@ class BlockRows:
 
 
 def stage_of(control: ProgramControl, unit: ProgramText, start: int, stop: int) -> BlockRows:
-    """What blocks say, and where they lead."""
+    """Evaluate the blocks from `start` to before `stop`, beginning at the present state of the control."""
     program = unit.program
     shapes, first = program.template[start:stop], program.first_number[start:stop]
     before = feed_unit(control), control.modal.feed, float(control.modal.motion)
@@ -152,12 +152,12 @@ def stage_of(control: ProgramControl, unit: ProgramText, start: int, stop: int) 
 
 
 def feed_unit(control: ProgramControl) -> float:
-    """What the number of an F word counts."""
+    """mm per unit of an F word; 1 under inverse time feed."""
     return 1.0 if control.modal.feed_mode == FeedMode.INVERSE_TIME else control.modal.unit
 
 
 def words(numbers: Array, first: Ints, slots: Ints) -> Array:
-    """The numbers at some slots of blocks, NaN where the slot is -1."""
+    """The numbers in the given slots of blocks, NaN for slot -1; `first`: index of each block's first number."""
     given = slots >= 0
     if given.all():
         return numbers.take(first + slots)
@@ -169,7 +169,7 @@ def words(numbers: Array, first: Ints, slots: Ints) -> Array:
 def followed(
     control: ProgramControl, numbers: Array, first: Ints, shapes: Shapes, tables: LaneTables, before: Before
 ) -> BlockRows:
-    """What blocks of some shapes with numbers from `first` on say, and where they lead."""
+    """Evaluate blocks of the given shapes, whose first numbers have the indices `first`."""
     position, offset, scale = (np.array(each) for each in (control.position, control.offset, control.scale))
     n = len(first)
     stage = BlockRows(
@@ -204,7 +204,7 @@ def followed(
 
 
 def filled(values: Array, valid: Mask, before: float) -> Array:
-    """Every row's value, or the last one given above it; `before` where none is."""
+    """Every row's value, or the last valid one above it; `before` where no row above is valid."""
     if valid.all():
         return values
     last = np.maximum.accumulate(np.where(valid, np.arange(len(values)), -1))
@@ -212,24 +212,25 @@ def filled(values: Array, valid: Mask, before: float) -> Array:
 
 
 FEWEST = 256
-"""Blocks that are offered at least: few enough to be gone through in no time."""
+"""Smallest number of blocks offered after a rejection; evaluating so few takes negligible time."""
 
 
 @mutable
 class Lookahead:
-    """The blocks that were looked at together, of which one stretch after the other is taken.
+    """Blocks evaluated together in advance, from which one stretch after the other is taken.
 
-    What stands between stretches (arcs, dwells, expressions) counts as if it did nothing; what it has really done is
-    put right where the next stretch begins, up to the next word of an axis, the next F, the next motion code.
-    Increments count from where the axes stand: of these each stretch is looked at by itself.
+    Blocks between stretches (arcs, dwells, expressions) are evaluated as if they did nothing. `put_right` corrects that
+    at the start of the next stretch: each axis up to its next word, the feed up to the next F, the motion code up to
+    the next code. In incremental coordinates (G91) positions depend on the start, and each stretch is evaluated on its
+    own.
 
-    begin  the first of these blocks; a jump may lead before it, or to it again from elsewhere
-    stage  what they say, and where they lead
-    frame  what their numbers counted from
-    done   the blocks before it may have been taken: their rows must not change any more, nor where this one starts,
-           which is where they end; a jump may come back to it from elsewhere
-    reach  so many blocks are looked at next time
-    most   so many blocks are offered to be taken next time
+    begin  index of the first evaluated block; a jump may lead to before it, or to it again from elsewhere
+    stage  the evaluated blocks
+    frame  coordinate mode, feed unit, offsets and scales with which they were evaluated
+    done   end of the blocks that may have been taken. Their rows, and the start position of this block, are in use and
+           must not change; a jump may lead back to it from elsewhere
+    reach  number of blocks to evaluate next time
+    most   largest number of blocks to offer next time
     """
 
     begin: int = 0
@@ -240,7 +241,7 @@ class Lookahead:
     most: int = field(default=LONGEST)
 
     def stretch(self, control: ProgramControl, unit: ProgramText, block: int, stop: int) -> BlockRows:
-        """The blocks from one on; the control stands before it. `done` is to be set to what has been taken of them."""
+        """The blocks from `block` to before `stop`, from the present state. The caller then sets `done`."""
         frame = control.modal.incremental, feed_unit(control), *control.offset, *control.scale
         begin, stage = self.begin, self.stage
         known = stage is not None and frame == self.frame and not control.modal.incremental
@@ -253,14 +254,14 @@ class Lookahead:
         return found
 
     def note(self, taken: int, offered: int) -> None:
-        """So many of the blocks offered can be taken: where others are in the way again and again, fewer are offered.
+        """Adapt the number of blocks to offer: fewer where stretches are interrupted again and again.
 
-        What is offered is gone through to find what is in the way.
+        All blocks offered are searched for the one that interrupts them, which would be wasted time.
         """
         self.most = min(2 * self.most, LONGEST) if taken == offered else max(2 * taken, FEWEST)
 
     def _looked(self, control: ProgramControl, unit: ProgramText, block: int, stop: int) -> BlockRows:
-        """Look at blocks, at twice as many as the last look was good for, but for those to `stop` at least."""
+        """Evaluate up to twice as many blocks as were used of the last evaluation, and at least those to `stop`."""
         if control.modal.incremental:
             return stage_of(control, unit, block, stop)
         if self.stage is not None:
@@ -269,7 +270,7 @@ class Lookahead:
 
 
 def put_right(stage: BlockRows, control: ProgramControl) -> None:
-    """Let blocks go on from where the control stands."""
+    """Correct the first rows of a stage to the present position, feed and motion code of the control."""
     here = np.array(control.position)
     for letter in np.flatnonzero(here.view(np.int64) != stage.path[0].view(np.int64)).tolist():
         stage.path[: rows_before((stage.mask >> letter & 1) != 0) + 1, letter] = here[letter]
@@ -278,6 +279,6 @@ def put_right(stage: BlockRows, control: ProgramControl) -> None:
 
 
 def rows_before(given: Mask) -> int:
-    """How many rows (n,) come before the first one that is given."""
+    """Number of rows (n,) before the first True; n if there is none."""
     first = int(given.argmax())
     return first if given[first] else len(given)

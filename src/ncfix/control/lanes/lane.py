@@ -1,10 +1,10 @@
-"""The fast lane: stretches of straight motions and arcs with plain numbers, taken all at once.
+"""The fast lane: stretches of straight motions and arcs with plain numbers, executed in numpy, all blocks at once.
 
-It does what the interpreter would do block by block, with the same operations in the same order, so that the
-results are the same to the last bit; a test holds the two together. What it cannot take it leaves alone.
+It applies the operations of the interpreter in the same order as block by block, so that results are identical to the
+last bit; a test compares the two. Blocks that it cannot execute are left to the interpreter.
 
-Arcs: what blocks say is read as columns. Where a centre lies that R says, and whether the control accepts an arc that
-does not surely close, is asked of `arcs`, arc by arc.
+Arcs: the words of the blocks are read as columns. The centre of an arc given by R, and whether the control accepts an
+arc whose radii at start and end differ, is computed by `arcs`, arc by arc.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from ncfix.control.lanes.block_rows import BlockRows, Lane, LaneTables, Lookahea
 from ncfix.control.moves import FeedMode, MotionKind
 
 SHORTEST = 16
-"""Stretches of fewer blocks go one by one."""
+"""Smallest number of blocks in a stretch; shorter stretches are executed block by block."""
 ARCS = (CLOCKWISE, COUNTER)
 
 
 class HasLane(Protocol):
-    """The plan of a block."""
+    """The plan of a block, as far as the fast lane uses it."""
 
     @property
     def lane(self) -> Lane | None:
-        """Where its numbers are, if it may go through the fast lane."""
+        """The slots of the block's numbers, or None if it must not go through the fast lane."""
 
 
 class LaneText(ProgramText, Protocol):
-    """A program text of which stretches are taken."""
+    """A program text whose stretches can go through the fast lane."""
 
     @property
     def ahead(self) -> Lookahead:
-        """What has been seen of the blocks to come."""
+        """The blocks evaluated in advance."""
 
     def plan(self, block: int) -> HasLane:
         """The plan of a block."""
@@ -53,7 +53,7 @@ class LaneText(ProgramText, Protocol):
 
 
 Turned = tuple[Circles | None, int]
-"""The circles of the arcs of a stage, and how many of its blocks run before one that the lane cannot take."""
+"""The circles of the arcs of a stage, and the number of its blocks before the first that the lane cannot execute."""
 
 
 def run_lane(
@@ -63,9 +63,9 @@ def run_lane(
     main: bool,
     turned: Callable[[int, BlockRows], Turned] | None = None,
 ) -> int:
-    """Take the stretch that begins with a block; the number of blocks taken, 0 for none.
+    """Execute the stretch that begins with `block`. Return the number of blocks executed, 0 if there is none.
 
-    turned  of languages that have arcs in the fast lane: finds the circles of a stage that begins with a block
+    turned  for languages that have arcs in the fast lane: finds the circles of the stage that begins with `block`
     """
     stop = min(unit.lane_end(block), block + unit.ahead.most)
     if stop - block < SHORTEST or not is_open(control, unit, block):
@@ -85,7 +85,7 @@ def run_lane(
 
 
 def is_open(control: ProgramControl, unit: LaneText, block: int) -> bool:
-    """Whether the state allows the fast lane at all."""
+    """Whether the modal state permits the fast lane."""
     modal = control.modal
     lane = unit.plan(block).lane
     begun = modal.motion in (0, 10) or (lane is not None and (lane.motion >= 0 or lane.turns))
@@ -94,9 +94,9 @@ def is_open(control: ProgramControl, unit: LaneText, block: int) -> bool:
 
 
 def before_placing(control: ProgramControl, mask: Ints, block: int) -> int:
-    """The block that first brings an unplaced axis to its place, or the end of blocks with these axis words (n,).
+    """The first block that names an axis whose position is unknown; `block` + n if none of n does (`mask`: (n,)).
 
-    That block goes by itself, so that all of a stretch have the same axes unplaced.
+    That block is executed by the interpreter, so that in a stretch the same axes are unplaced throughout.
     """
     if not control.places.unplaced or control.modal.incremental:
         return block + len(mask)
@@ -105,7 +105,7 @@ def before_placing(control: ProgramControl, mask: Ints, block: int) -> int:
 
 
 def count_allowed(control: ProgramControl, stage: BlockRows) -> int:
-    """How many blocks run before one that is refused for want of a feed, or that has no time of its own."""
+    """Number of blocks before the first that is refused for lack of a feed, or of an F under inverse time feed."""
     modal, count = control.modal, len(stage.mask)
     exact = control.needs_feed or modal.feed_mode == FeedMode.INVERSE_TIME
     if not exact or (modal.feed_mode == FeedMode.PER_MINUTE and modal.feed_given and stage.feed.all()):
@@ -122,13 +122,13 @@ def count_allowed(control: ProgramControl, stage: BlockRows) -> int:
 
 
 def moving(stage: BlockRows) -> Mask:
-    """(n,) blocks that make a motion."""
+    """(n,) blocks that make a motion: they have axis words or are arcs."""
     named: Mask = stage.mask != 0
     return named if stage.turns is None else named | stage.turns
 
 
 def take(control: ProgramControl, stage: BlockRows, block: int, main: bool, circles: Circles | None = None) -> None:
-    """Add the motions of a stretch, and leave the control as they leave it; `circles`: of its arcs, by their block."""
+    """Add the motions of a stretch and update the state of the control; `circles`: of its arcs, by block."""
     modal, moves = control.modal, moving(stage)
     note_codes(control, stage)
     if not moves.any():
@@ -154,7 +154,7 @@ def take(control: ProgramControl, stage: BlockRows, block: int, main: bool, circ
 
 
 def note_codes(control: ProgramControl, stage: BlockRows) -> None:
-    """Leave feed and motion codes in force as a stretch leaves them."""
+    """Update the feed and the motion codes in force after a stretch."""
     modal = control.modal
     modal.motion = int(stage.motion[-1])
     straight = stage.motion[-1:] if modal.motion <= 10 else stage.motion[stage.motion <= 10]
@@ -166,7 +166,7 @@ def note_codes(control: ProgramControl, stage: BlockRows) -> None:
 
 
 def styles(control: ProgramControl, stage: BlockRows) -> Ints:
-    """The styles of motions whose start and end are known, (n,)."""
+    """The styles of the motions of a stretch, (n,); their start and end are known."""
     found = np.full(len(stage.motion), control.style_of(MotionKind.FEED, 10))
     rapid = stage.motion == 0
     if rapid.any():
@@ -181,9 +181,9 @@ def styles(control: ProgramControl, stage: BlockRows) -> Ints:
 
 
 def turned(control: ProgramControl, unit: ProgramText, block: int, stage: BlockRows) -> tuple[Circles | None, int]:
-    """The circles of the arcs of a stage that begins with a block, and how many blocks run before one for `arc`.
+    """The circles of the arcs of a stage that begins with `block`, and the number of blocks before one left to `arc`.
 
-    That is what the lane cannot take: an arc that the control refuses, or one without the words that it needs.
+    The lane leaves out an arc that the control refuses, or one that lacks words.
     """
     assert stage.turns is not None
     rows = np.flatnonzero(stage.turns | (stage.motion > 10))
@@ -212,7 +212,7 @@ def turned(control: ProgramControl, unit: ProgramText, block: int, stage: BlockR
 
 
 def closes(control: ProgramControl, step: Array, centre: Array) -> Mask:
-    """(k,) arcs that surely close, from their start to `step` about `centre`; of the others `on_circle` says it."""
+    """(k,) arcs whose radii at start and end (`step` from the start) surely agree; `on_circle` decides on others."""
     start, end = np.hypot(*centre.T), np.hypot(*(step - centre).T)
     return (np.minimum(start, end) > 2 * ZERO_RADIUS) & (np.abs(start - end) < control.closure_mm / 2)
 
@@ -220,7 +220,7 @@ def closes(control: ProgramControl, step: Array, centre: Array) -> Mask:
 def on_circle(
     control: ProgramControl, end: list[float], centre: list[float], radius: float, *, clockwise: bool
 ) -> tuple[float, float]:
-    """The centre relative to the start, from R (NaN without) or from what centre words say; raises `Fault`."""
+    """The centre relative to the start, mm, from R (NaN without R) or the given centre; raises `Fault` if refused."""
     way = end[0], end[1]
     if not math.isnan(radius):
         return centre_from_radius(way, radius, clockwise=clockwise)
@@ -230,9 +230,9 @@ def on_circle(
 
 
 def fitting(control: ProgramControl, unit: ProgramText, block: int, stage: BlockRows, rows: Ints) -> int:
-    """How many blocks run before an arc without the words that it needs, or a straight motion with those of one.
+    """Number of blocks before the first arc that lacks words or is a spiral, or straight motion with an arc's words.
 
-    rows  (k,) the blocks that have such words, or that G2 or G3 is in force at
+    rows  (k,) the blocks that have words of arcs, or in which G2 or G3 is in force
     """
     assert stage.turns is not None
     turns, motion = stage.turns[rows], stage.motion[rows]
@@ -243,7 +243,7 @@ def fitting(control: ProgramControl, unit: ProgramText, block: int, stage: Block
 
 
 def named(control: ProgramControl, lanes: LaneTables) -> Mask:
-    """(s,) shapes with the words that an arc needs in the plane in force."""
+    """(s,) block shapes that have the words of an arc in the active plane: its centre, or R and an end in the plane."""
     plane = control.modal.plane
     if plane.across > 2:
         return np.zeros(len(lanes.turns), dtype=np.bool_)
@@ -255,7 +255,7 @@ def named(control: ProgramControl, lanes: LaneTables) -> Mask:
 
 
 def is_flat(control: ProgramControl, unit: ProgramText, blocks: Ints) -> Mask:
-    """(k,) blocks without a centre word across the plane in force, or with one that says nothing: no spirals."""
+    """(k,) blocks without a centre word across the active plane, or with one that has no effect: no spirals."""
     program, plane = unit.program, control.modal.plane
     if plane.across > 2:
         return np.zeros(len(blocks), dtype=np.bool_)
@@ -265,7 +265,7 @@ def is_flat(control: ProgramControl, unit: ProgramText, blocks: Ints) -> Mask:
 
 
 def centre_words(control: ProgramControl, unit: ProgramText, blocks: Ints, begin: Array) -> tuple[Array, Array]:
-    """What the centre words of blocks say, (k, 2) relative to their starts `begin`, and R, (k,) NaN without; in mm."""
+    """Centres (k, 2), mm, relative to the start points `begin`, and radii R (k,), mm, NaN without R, of arc blocks."""
     program, lanes, plane = unit.program, unit.lanes, control.modal.plane
     shapes, first, mm = program.template[blocks], program.first_number[blocks], control.unit_of(X)
     columns = list(plane.pair)

@@ -1,1 +1,1 @@
-"""Files of tools: tables of controls, and tool data that is written as a program."""
+"""Reading tool lengths and radii: tool tables of controls, and tool data written as a program."""

@@ -1,15 +1,15 @@
 """Tool data that controls write as a program: `$TC_DP...` of SINUMERIK, G10 of Fanuc.
 
 - SINUMERIK (`%_N_TO1_TOA` and the like): `$TC_DP3[T, D]=120.5` is length 1 of edge D of the tool with number T; wear
-  ($TC_DP12) and base ($TC_DP21) count with it, and so does $TC_DP15 with the radius, $TC_DP6. A tool with
-  lengths along the two other axes has no known length here, and turning tools are left out: their length 1 is along
-  another axis. Where a tool has a name ($TC_TP2) it is called by that. Tools with the same name take turns: which one
-  is in the spindle only the control knows, and they are left out. Source: Function Manual Tools (W1, WZV).
-- Fanuc: `G10 L10 P1 R120.5`, length of offset number P; L11 (or L1) its wear, or the whole in a file without L10;
-  an offset with a wear alone is refused, and left out if that is zero. L12 and L13 are radii or diameters, which a
-  parameter says (5004#2), and are left out, as work offsets are (L2, L20). G20 or G21 says the unit. A value without a
-  decimal point counts in increments that nobody says here, and is refused. Source: operator's manuals, "Tool
-  compensation values".
+  ($TC_DP12) and base ($TC_DP21) are added to it, and wear $TC_DP15 to the radius $TC_DP6. A tool with lengths along
+  the two other axes is taken as of unknown length. Turning tools are skipped, since their length 1 lies along another
+  axis. A tool with a name ($TC_TP2) is listed by its name. Tools with the same name are replacement tools: only the
+  control knows which one is in the spindle, so they are skipped. Source: Function Manual Tools (W1, WZV).
+- Fanuc: `G10 L10 P1 R120.5` sets the length of offset number P; L11 (or L1) its wear, or the whole length in a file
+  without L10. An offset that has only a wear is refused, or skipped if the wear is zero. L12 and L13 are radii or
+  diameters, depending on a parameter (5004#2), and are skipped, like work offsets (L2, L20). G20 or G21 states the
+  unit. A value without a decimal point counts in least increments, whose size the file does not state, and is refused.
+  Source: operator's manuals, "Tool compensation values".
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ncfix.control.coordinates import INCH
 from ncfix.control.setup import Tool
 
 Row = tuple[int, tuple[int | str, Tool] | str]
-"""Line number, and the number or name of a tool with what it is, or what is wrong."""
+"""Line number, and the number or name of a tool with its data, or a message about the line."""
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 ASSIGNED = re.compile(
@@ -29,31 +29,31 @@ ASSIGNED = re.compile(
 )
 UNIT = re.compile(r"CHANDATA\s*\(\s*(\d+)\s*\)", re.IGNORECASE)
 LENGTHS, RADII = (3, 12, 21), (6, 15)
-"""$TC_DP of length 1 (geometry, wear, base) and of the radius (geometry, wear)."""
+"""Numbers of $TC_DP for length 1 (geometry, wear, base) and for the radius (geometry, wear)."""
 ASIDE = {"X": (5, 14, 23), "Y": (4, 13, 22)}
-"""Of lengths 3 and 2, along the axes of the plane G17."""
+"""Axis -> numbers of $TC_DP for the length along it (lengths 3 and 2, with the plane G17)."""
 TURNING = range(500, 600)
-"""Types of turning tools."""
+"""Numbers of the types of turning tools ($TC_DP1)."""
 BESIDES = {"ADP": "adapters of tools", "SCP": "sum offsets", "ECP": "set-up offsets"}
-"""$TC_ that lengthen a tool besides its $TC_DP."""
+"""Other $TC_ data that lengthen a tool."""
 
 WORD = re.compile(rf"([A-Z])({NUMBER})")
 AROUND = re.compile(
     r"(?:N\d+)?(?:[O:]\d+|(?:G(?:90|20|21|17|40|49|80|94))+|(?:G90)?G10(?:G90)?L(?:2|20)P.*|M(?:0?2|30|99))"
 )
-"""Blocks among tool offsets that change none: a program's number, settings, work offsets, its end."""
+"""Blocks that may stand among tool offsets and do not change them: program number, settings, work offsets, end."""
 INCHES = {"G20": INCH, "G21": 1.0}
 GEOMETRY, WEAR, OLD, ACROSS = 10, 11, 1, (12, 13)
-"""L of G10; controls with one table for lengths and radii write none, or L1."""
+"""L of G10: geometry, wear, wear of controls with a single table (or no L at all), and those of cutter radii."""
 
 
 def is_tool_data(text: str) -> bool:
-    """Whether a text assigns data of edges."""
+    """Whether a text has tool data of SINUMERIK: it assigns data of edges ($TC_DP)."""
     return re.search(r"(?im)^[^;\n]*\$TC_DP\d+\s*\[", text) is not None
 
 
 def tool_data_rows(text: str, scale: float) -> Iterator[Row]:
-    """The tools of SINUMERIK's tool data; scale: mm per unit of a length."""
+    """The tools of SINUMERIK's tool data; `scale`: mm per unit of length."""
     edges: dict[tuple[int, int], dict[int, float]] = {}
     names: dict[int, str] = {}
     lines: dict[int, int] = {}
@@ -86,12 +86,12 @@ def tool_data_rows(text: str, scale: float) -> Iterator[Row]:
 
 
 def is_offsets(text: str) -> bool:
-    """Whether a text has tool offsets as G10 writes them."""
+    """Whether a text has tool offsets written with G10."""
     return any(_offset(block) for _, block in _blocks(text))
 
 
 def _blocks(text: str) -> Iterator[tuple[int, str]]:
-    """The blocks of a program with their lines, in upper case, without comments, blanks and marks of its ends."""
+    """Line numbers and blocks of a program, in upper case, without comments, blanks and the marks `%` and `;`."""
     for line, row in enumerate(text.splitlines(), 1):
         plain = "".join(re.sub(r"\([^)]*\)?", "", row).split()).strip("%;").upper()
         if plain:
@@ -99,8 +99,9 @@ def _blocks(text: str) -> Iterator[tuple[int, str]]:
 
 
 def _offset(block: str) -> dict[str, str]:
-    """The values of L, if it is there, P and R of a block that sets an offset, in any order, and of `G`, G90 or G91, if
-    that is there; empty of another block.
+    """The values of L (optional), P and R, in any order, of a block that sets an offset; empty for any other block.
+
+    `G` is "90" or "91" if the block has that code.
     """
     words = WORD.findall(block)
     codes = sorted(value for letter, value in words if letter == "G")
@@ -112,7 +113,7 @@ def _offset(block: str) -> dict[str, str]:
 
 
 def offset_rows(text: str, scale: float) -> Iterator[Row]:
-    """The offset numbers of a file of G10; scale: mm per unit of a length where no G20 or G21 says it."""
+    """The tools by offset number of a file of G10; `scale`: mm per unit of length if the file has no G20 or G21."""
     found: dict[tuple[int, int], tuple[int, float]] = {}
     units: set[float] = set()
     for line, plain in _blocks(text):

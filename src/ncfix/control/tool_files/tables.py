@@ -1,15 +1,15 @@
-"""Tool tables as controls keep them: LinuxCNC's `.tbl`, Heidenhain's TOOL.T, and CSV with a header.
+"""Tool tables in the formats of controls: LinuxCNC's `.tbl`, Heidenhain's TOOL.T, and CSV with a header.
 
-- LinuxCNC: one tool a line, `T1 P1 Z120.5 D10 ; comment`. Z is the length offset and D the diameter, both in the unit
-  of the machine. G43 adds the offsets of all other axes, too: the length of a tool that has one is not
-  known. I, J and Q are of a lathe's tool nose. Lines above the first tool that are none are for people, as the control
-  takes them. Source: LinuxCNC documentation, "Tool table format".
-- TOOL.T: columns at fixed places under a line of names, and above that a description of the columns on newer controls.
-  L and R count with their oversizes DL and DR. A tool with an index (5.1) and a row without a length are left out. A
-  word that begins in one column and ends in the next is refused: columns are at other places then. Source: TNC 640
+- LinuxCNC: one tool per line, `T1 P1 Z120.5 D10 ; comment`. Z is the length offset and D the diameter, both in the unit
+  of the machine. G43 also adds the offsets of all other axes; a tool that has one is taken as of unknown length. I, J
+  and Q describe the nose of a turning tool. Lines above the first tool that are no entries are skipped, as LinuxCNC
+  does. Source: LinuxCNC documentation, "Tool table format".
+- TOOL.T: columns at fixed places below a line of names; on newer controls, a description of the columns precedes it.
+  The oversizes DL and DR are added to L and R. Indexed tools (5.1) and rows without a length are skipped. A word that
+  begins in one column and ends in the next is refused, since the columns then are at other places. Source: TNC 640
   user's manual, "Entering tool data in the table".
 
-What is written as a program, tool data of SINUMERIK and G10 of Fanuc, is in `ncfix.control.tool_files.programs`.
+`ncfix.control.tool_files.programs` reads tool data that is written as a program: of SINUMERIK, and G10 of Fanuc.
 """
 
 from __future__ import annotations
@@ -31,26 +31,26 @@ BAD_TABLE = "NCF385"
 ENTRY = re.compile(r"([TPXYZABCUVWDIJQ])\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+)?)(?![\d.E])", re.IGNORECASE)
 """A word of LinuxCNC's tool table."""
 ASIDE = "XYABCUVW"
-"""Axes along which a tool has no length here."""
+"""Axes other than Z: the length of a tool with an offset along one of them is taken as unknown."""
 SHORT = 15.0
-"""mm; no tool with its holder is as short."""
+"""Length, mm, that at least one tool of a table in mm exceeds; a tool with its holder is never so short."""
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)\Z")
 LONGEST = 1e6
-"""mm; a number beyond it is a slip."""
+"""Largest plausible length or radius, mm; a larger number is a typing error."""
 COLUMNS = ("tool", "length", "radius", "diameter")
 WORDS = ("name", "description", "comment", "note")
-"""Columns for people."""
+"""Columns for the reader, which ncfix ignores."""
 UNITS = {"mm": 1.0, "inch": INCH}
 OTHERWISE = "docs/formats.md lists the tables that are read; any other one as CSV with columns tool, length"
 
 
 def load_tool_table(path: str, axes: Collection[str] = ASIDE, unit: str = "mm") -> dict[int | str, Tool]:
-    """The tools in a control's table, by number, or by name where they are called so; of what form shows in the text.
+    """The tools in a control's table, by number or by name, as the table calls them. The text shows the format.
 
-    axes  of the machine: offsets along others do nothing
-    unit  "mm" or "inch", of tables that do not say it
+    axes  axes of the machine: offsets along others have no effect
+    unit  "mm" or "inch", for formats that do not state it
 
-    Raises SourceError NCF002, ConfigError NCF385 with every line that is wrong.
+    Raises SourceError NCF002, and ConfigError NCF385 with every wrong line.
     """
     source = read_bytes(path, MOST_SAID)
     text, (what, hint) = plain_text(source), other_form(source)
@@ -77,7 +77,7 @@ def load_tool_table(path: str, axes: Collection[str] = ASIDE, unit: str = "mm") 
 
 
 def _rows(text: str, path: str, axes: Collection[str], scale: float) -> Iterator[Row]:
-    """The tools of a text, in mm."""
+    """The rows of a table, lengths in mm, by the reader for its format."""
     if TOOL_T_BEGIN.match(text):
         return tool_t_rows(text)
     if is_tool_data(text):
@@ -90,7 +90,7 @@ def _rows(text: str, path: str, axes: Collection[str], scale: float) -> Iterator
 
 
 def may_be_in_inches(tools: Mapping[int | str, Tool]) -> str:
-    """What is said of a table in which no tool is as long as tools are in mm; "" of any other."""
+    """A question to the user if all tools are too short for a table in mm; otherwise ""."""
     lengths = [tool.length for tool in tools.values() if tool.length is not None and tool.length > 0]
     if len(lengths) < 2 or max(lengths) > SHORT:
         return ""
@@ -98,7 +98,7 @@ def may_be_in_inches(tools: Mapping[int | str, Tool]) -> str:
 
 
 def linuxcnc_rows(text: str, axes: Collection[str], scale: float) -> Iterator[Row]:
-    """The lines of a LinuxCNC table for a machine with these axes."""
+    """The entries of a LinuxCNC table, for a machine that has these axes."""
     begun = False
     for line, content in enumerate(text.splitlines(), 1):
         entry = content.partition(";")[0].strip()
@@ -140,7 +140,7 @@ def csv_rows(text: str, scale: float) -> Iterator[Row]:
 
 
 def csv_tool(names: list[str], row: list[Cell], separated: SeparatedText, scale: float) -> tuple[int, Tool] | str:
-    """One tool, or what is wrong with its row."""
+    """One tool with its number, or a message about its row."""
     if len(row) != len(names):
         return f"{len(row)} values for {len(names)} columns"
     values = {}
@@ -200,7 +200,7 @@ def tool_t_rows(text: str) -> Iterator[Row]:
 
 
 def _past_description(lines: list[str]) -> int:
-    """The index of the line of column names: behind the description of the columns that newer controls write."""
+    """The index of the line of column names: after the description of the columns that newer controls write."""
     begins = lines[1].split(maxsplit=1)[:1] if len(lines) > 1 else []
     end = {"#STRUCTBEGIN": "#STRUCTEND", "TableDescription": ")"}.get("".join(begins))
     if end is None:
@@ -209,7 +209,7 @@ def _past_description(lines: list[str]) -> int:
 
 
 def tool_of(cells: dict[str, str], scale: float) -> tuple[int, Tool] | str:
-    """One tool, or what is wrong with its row."""
+    """One tool with its number, or a message about its row."""
     wrong = [name for name in WANTED if cells.get(name) and not TOOL_T_NUMBER.match(cells[name])]
     if wrong:
         return f"{wrong[0]}: {cells[wrong[0]]!r} is not a number"
