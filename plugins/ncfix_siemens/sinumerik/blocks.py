@@ -1,6 +1,6 @@
-"""One block of SINUMERIK by the grammar; what the grammar does not take and has a name in it is kept as it is.
+"""Parser of one SINUMERIK block: the tree of the grammar becomes the template of a shape.
 
-A grammar's tree becomes the template of its shape.
+A block that the grammar does not accept, but that contains a name, is kept as an opaque statement.
 """
 
 from __future__ import annotations
@@ -59,13 +59,13 @@ if TYPE_CHECKING:
     from ncfix.text.build import Branch, Node
 
 BRACKET = "("
-"""The operator of a `Unary` that is nothing but a pair of brackets."""
+"""The operator of a `Unary` that is a pair of brackets."""
 
 BASES = {"H": 16, "B": 2, "D": 10}
 
 
 def build(tree: Branch, text: str) -> Parsed:
-    """Make the template of a block from its tree; raises `TooDeepError`."""
+    """Build the template of a block from its tree; raises `TooDeepError`."""
     tokens = [token for token in tokens_of(tree) if kind(token) in NUMBERS]
     spans = tuple(edges(token) for token in tokens)
     slots = {edges(token): slot for slot, token in enumerate(tokens)}
@@ -84,7 +84,7 @@ def value_of(number: Token) -> float:
 
 @frozen
 class SinumerikBuilder(TreeBuilder):
-    """Makes items of trees."""
+    """Builds the items of a block from its tree."""
 
     def block(self, tree: Branch) -> Iterator[Item]:
         """The items of a block in the order written."""
@@ -95,7 +95,7 @@ class SinumerikBuilder(TreeBuilder):
                 yield from self.statement(node)
 
     def token(self, token: Token) -> Item:
-        """An item that is a single terminal."""
+        """The item of a single terminal."""
         span = self.span(token)
         match kind(token):
             case "COMMENT":
@@ -108,7 +108,7 @@ class SinumerikBuilder(TreeBuilder):
                 return Opaque(name.lower(), span)
 
     def statement(self, tree: Branch) -> Iterator[Item]:
-        """The items that one rule makes."""
+        """The items of one rule."""
         makers: dict[str, Callable[[Branch], Item]] = {
             "line_number": self.word,
             "word": self.word,
@@ -134,7 +134,7 @@ class SinumerikBuilder(TreeBuilder):
     # -- words --------------------------------------------------------------------------------------------------------
 
     def setting(self, tree: Branch) -> Item:
-        """A word or a variable that gets a value."""
+        """A word, or an assignment to a variable."""
         *target, value = tree.children
         name = str(target[0])
         if len(target) == 1 and is_word(name):
@@ -142,7 +142,7 @@ class SinumerikBuilder(TreeBuilder):
         return Assignment(self.target(target), self.expression(value), self.span(tree))
 
     def target(self, nodes: list[Node]) -> NumberedParameter | NamedParameter | FunctionCall:
-        """What gets a value: `R1`, `R[..]`, a variable, an element of an array."""
+        """The target of an assignment: `R1`, `R[..]`, a variable, an element of an array."""
         name = str(nodes[0])
         if len(nodes) == 2:
             return self.array_element(name, nodes[1])
@@ -169,7 +169,7 @@ class SinumerikBuilder(TreeBuilder):
         return Command(str(name).lower(), (StringLiteral(str(text)[1:-1]),), True, self.span(tree))
 
     def bare_element(self, tree: Branch) -> Item:
-        """`NAME[..]` by itself: a macro of an array, not known to do anything."""
+        """`NAME[..]` alone: an array macro, of unknown effect."""
         name, index = tree.children
         return Command(str(name).lower(), self.arguments(index), True, self.span(tree))
 
@@ -209,7 +209,7 @@ class SinumerikBuilder(TreeBuilder):
         return OWordLine("", "for", values, self.span(tree))
 
     def jump(self, tree: Branch) -> Item:
-        """`GOTOF`, `GOTOB`, ... and where to; a label may be put together, `"MARK"<<R1`."""
+        """`GOTOF`, `GOTOB`, ... with the label, which may be computed, `"MARK"<<R1`."""
         keyword, *where = tree.children
         label: str | Expression = ""
         if where and kind(where[0]) == "joined":
@@ -220,7 +220,7 @@ class SinumerikBuilder(TreeBuilder):
         return OWordLine(label, str(keyword).lower(), (), self.span(tree))
 
     def repetition(self, tree: Branch) -> Item:
-        """`REPEAT` that begins a loop, or repeats what stands from a label on, to another if there is one."""
+        """`REPEAT` that begins a loop, or that repeats the blocks from a label on, or between two labels."""
         keyword, *labels = tree.children
         names = [str(label).upper() for label in labels]
         return OWordLine(
@@ -241,13 +241,13 @@ class SinumerikBuilder(TreeBuilder):
     # -- expressions --------------------------------------------------------------------------------------------------
 
     def arguments(self, node: Node, depth: int = 0) -> tuple[Expression | None, ...]:
-        """What stands between brackets; None where an argument is left out."""
+        """The arguments between brackets; None for an omitted one."""
         assert not is_token(node)
         values = tuple(None if kind(part) == "omitted" else self.expression(part, depth) for part in node.children)
         return () if values == (None,) else values
 
     def compound(self, tree: Branch, depth: int) -> Expression:
-        """The expression that a tree stands for."""
+        """The expression of a tree."""
         if depth > MAX_DEPTH:
             raise TooDeepError(edges(tree)[0])
         parts = tree.children
@@ -275,14 +275,14 @@ class SinumerikBuilder(TreeBuilder):
 
 
 def is_word(name: str) -> bool:
-    """Whether a name with a value is an address: a letter, a letter with a number, or one of the longer ones."""
+    """Whether a name with a value is an address: a letter, a letter with a number, or one of `SETTERS`."""
     if name[:1].upper() == "R" and name[1:].isdigit():
         return False
     return len(name) == 1 or name[1:].isdigit() or name.lower() in SETTERS
 
 
 def destination(node: Node) -> str:
-    """Where a jump leads: a label or `N100`; a text names one."""
+    """The target of a jump: a label or `N100`, also given as a string."""
     text = str(node)
     if kind(node) == "TEXT":
         return text[1:-1].upper()
@@ -299,18 +299,18 @@ def bits(text: str) -> float:
 
 
 STATEMENT = "statement"
-"""The kind of an `Opaque` that could not be understood: it may be anything, a call of a cycle for instance."""
+"""The kind of an `Opaque` for a block that was not understood, for instance a call of an unknown cycle."""
 
 NAME = re.compile(r"[A-Z_]{2}", re.IGNORECASE)
 QUOTED = re.compile(r'"[^"]*"|;.*', re.DOTALL)
 ONCE = frozenset("XYZABCUVWIJKF") | {"I1", "J1", "K1", "CR", "AR", "AP", "RP", "TURN"}
-"""Addresses that a block may have once."""
+"""Addresses that a block may have only once."""
 
 WHOLE = Span(Anchor(START, 0), Anchor(END, 0))
 
 
 def parse_block(dialect: Dialect, text: str) -> Parsed:
-    """One block; raises `BlockError` where not even a name could excuse it."""
+    """Parse one block; raises `BlockError` for a fault, unless the block contains a name."""
     try:
         parsed = build(parse(dialect, text), text)
     except UnparsedError as error:
@@ -326,7 +326,7 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
 
 
 def check_repeats(parsed: Parsed) -> None:
-    """Refuse a word of a motion that stands twice."""
+    """Refuse a repeated word of a motion."""
     seen: set[str] = set()
     for word in parsed.template.words:
         if word.address in seen and word.address in ONCE:
@@ -335,7 +335,7 @@ def check_repeats(parsed: Parsed) -> None:
 
 
 def explained(place: int, text: str) -> BlockError:
-    """Why the parser stopped at a place, in words."""
+    """The error of a block at the place where the parser stopped."""
     before, at = text[:place].rstrip(), text[place : place + 1]
     if before.endswith("="):
         return BlockError("NCF114", "there is no value after =", place)

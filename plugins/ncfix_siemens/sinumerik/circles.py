@@ -1,6 +1,6 @@
-"""G2, G3 and CIP: from the words of a block to an arc in commands.
+"""Arcs by G2, G3, CIP and CT: from the words of a block to an arc in machine axes.
 
-CT goes on in the direction in which the motion before it ended.
+A CT arc is tangential to the end of the motion before it.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, CT_LEFT, CT_RIGHT, Bloc
 NO_HEADING = "in which direction the motion before this arc (CT) ends is not known"
 TURNS_AT_RUNTIME = "the turns of the arc (CT) are known only at run time"
 STRAIGHT = 1e-9
-"""Of the chord: an arc that strays by less from a line is one."""
+"""Sine of the angle between heading and chord below which a CT arc is a straight line."""
 
 
 def tangential(control: Sinumerik, words: BlockWordValues) -> None:
-    """CT with its end; TURN adds full turns. One that is refused keeps what it begins from, and so its direction."""
+    """Execute CT, the arc tangential to the last motion; TURN adds full turns."""
     control.use_all_start_positions()
     end, heading, plane = destination(control, words), control.heading, control.modal.plane
     why = TURNS_AT_RUNTIME if words.unknown("TURN") else ""
@@ -63,13 +63,13 @@ TWICE = "{} says by {} and {} where the arc lies: which of them counts is not su
 ACROSS = "{} says by {} where its centre lies across the plane, and by {} where the arc lies: what counts is not sure"
 NO_END = "CIP without an end point: no circle is given by two points"
 FLAT = 1e-9
-"""A triangle of a smaller height, relative, has no circle."""
+"""Relative area of the triangle of three points below which they are collinear."""
 
 Triple = tuple[float, float, float]
 
 
 def misled(control: Sinumerik, words: BlockWordValues, name: str, taken: frozenset[str]) -> str:
-    """Why a motion is refused that has words of arcs beyond those that it takes, or more than say an arc; or empty."""
+    """Why a motion is refused that has arc words it does not take, or contradictory ones; "" if it is not."""
     named = words.values.keys() & (OF_ARCS | OF_CIP | {"ANG"})
     if not named:
         return ""
@@ -89,7 +89,7 @@ def misled(control: Sinumerik, words: BlockWordValues, name: str, taken: frozens
 
 
 def arc(control: Sinumerik, words: BlockWordValues, code: int) -> None:
-    """An arc, helix or full circle by its centre, radius or opening angle."""
+    """Execute an arc, helix or full circle, given by centre, radius or opening angle."""
     control.use_all_start_positions()
     end = destination(control, words)
     doubtful = bool(end.unknown or control.unknown or words.unknown("I", "J", "K", "CR", "AR", "TURN"))
@@ -109,13 +109,13 @@ def arc(control: Sinumerik, words: BlockWordValues, code: int) -> None:
 
 
 def is_fixed(words: BlockWordValues, plane: Plane) -> bool:
-    """Whether words say where the centre is: by `AC`, or as the pole."""
+    """Whether the centre is given absolutely: by `AC`, or as the pole."""
     letters = plane.of(CENTRE_LETTERS)
     return bool({"AP", "RP"} & words.values.keys()) or any(words.forms.get(each) == ABSOLUTE for each in letters)
 
 
 def refusal_of(words: BlockWordValues, plane: Plane) -> str:
-    """Why an arc is refused: something of it is known only at run time, or not followed."""
+    """Why an arc is refused: its words are unknown or not followed; "" if it is not refused."""
     letters = plane.of(CENTRE_LETTERS)
     if words.unknown(*letters, "CR", "AR", "TURN"):
         return CENTRE_AT_RUNTIME
@@ -124,7 +124,7 @@ def refusal_of(words: BlockWordValues, plane: Plane) -> str:
 
 
 def doubtful_diameter(control: Sinumerik, words: BlockWordValues, address: str) -> str:
-    """Why an arc is refused whose point with this X might be meant as a diameter."""
+    """Why an arc is refused whose absolute X word `address` may be a diameter; "" if it is not."""
     form = words.forms.get(address, "")
     absolute = form == ABSOLUTE or (address == "I1" and not form and not control.modal.incremental)
     counts = control.modal.diameter and absolute and address in words.values
@@ -132,7 +132,7 @@ def doubtful_diameter(control: Sinumerik, words: BlockWordValues, address: str) 
 
 
 def geometry(control: Sinumerik, words: BlockWordValues, end: MotionEnd, *, clockwise: bool) -> tuple[Point, MotionEnd]:
-    """The centre relative to the start in the plane, mm, and the end; raises `Fault` if the control refuses the arc."""
+    """Centre relative to the start in the plane, mm, and end of an arc; raises `Fault` if the control refuses it."""
     plane = control.modal.plane
     step = control.way_to(end.target)
     chord = plane.of(step)
@@ -159,7 +159,7 @@ def geometry(control: Sinumerik, words: BlockWordValues, end: MotionEnd, *, cloc
 
 
 def centre_words(control: Sinumerik, words: BlockWordValues, plane: Plane) -> Point:
-    """The centre relative to the start, mm: I J K count from the start unless they say `AC`."""
+    """The centre relative to the start, mm, by I J K, which are incremental unless they have `AC`."""
     here = control.program_position()
     found = []
     for index in plane.pair:
@@ -195,7 +195,7 @@ def ended_by_angle(
 
 
 def circle_of(control: Sinumerik, plane: Plane, centre: Point, sweep: float) -> Arc:
-    """The circle in commands; where an odd number of axes is mirrored it runs the other way about its normal."""
+    """The arc in machine axes; if an odd number of axes is mirrored, its normal is reversed."""
     circle = control.circle(plane, centre, sweep)
     if not control.is_rotated:
         return circle
@@ -208,7 +208,7 @@ def circle_of(control: Sinumerik, plane: Plane, centre: Point, sweep: float) -> 
 
 
 def through_point(control: Sinumerik, words: BlockWordValues, code: int) -> None:
-    """CIP: the circle through the start, the point I1 J1 K1 and the end, in any plane."""
+    """Execute CIP, the circle through start, intermediate point I1 J1 K1 and end, in any plane."""
     control.use_all_start_positions()
     end = destination(control, words)
     why = VIA_AT_RUNTIME if words.unknown(*VIA, "TURN") else doubtful_diameter(control, words, "I1")
@@ -227,7 +227,7 @@ def through_point(control: Sinumerik, words: BlockWordValues, code: int) -> None
 
 
 def via_point(control: Sinumerik, words: BlockWordValues) -> Triple:
-    """The intermediate point as a command."""
+    """The intermediate point in machine axes, mm."""
     program = control.program_position()
     for index, address in enumerate(VIA):
         if address not in words.values:
@@ -240,7 +240,7 @@ def via_point(control: Sinumerik, words: BlockWordValues) -> Triple:
 
 
 def circle_through(start: Triple, via: Triple, end: Triple) -> Arc:
-    """The circle through three points, run through in that order; raises `Fault` if they are in line."""
+    """The circle through three points in that order; raises `Fault` if they are collinear."""
     u = [b - a for a, b in zip(start, via, strict=True)]
     v = [b - a for a, b in zip(start, end, strict=True)]
     normal = cross(u, v)

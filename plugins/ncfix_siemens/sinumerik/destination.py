@@ -1,4 +1,4 @@
-"""Where the axis words of a block lead: absolute, incremental, word by word otherwise, in polar coordinates."""
+"""The end of a block's motion by its axis words: absolute, incremental, with forms, polar, in machine coordinates."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ ASIDE = "an angle (AP) that is left out, or an increment of AP or RP, where the 
 NEAR_POLE = 1e-6
 """mm"""
 STILL = 1e-9
-"""rad; an axis that is nearer to where it shall be stands there already."""
+"""Largest difference of equal angles, rad."""
 INCREMENT_IN_PLANE = (
     "where the axis {} stands after increments in machine coordinates in a swivelled plane is not followed"
 )
 
 
 def destination(control: Sinumerik, words: BlockWordValues) -> MotionEnd:
-    """The command at which a motion of this block ends; refused where a word of X that is added would be a radius."""
+    """The command at the end of the block's motion; refused if an increment of X would be a radius (DIAM90)."""
     program = control.program_position()
     lost = dict(control.lost_in_frame())
     moved = 0
@@ -46,7 +46,7 @@ def destination(control: Sinumerik, words: BlockWordValues) -> MotionEnd:
 
 
 def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vector, lost: UnknownAxes) -> None:
-    """Take one axis word."""
+    """Apply one axis word to the position `program` and the unknown axes `lost`."""
     index, value = INDEX[letter], words.values[letter]
     form = words.forms.get(letter, "")
     incremental = control.counts_on(form)
@@ -79,7 +79,10 @@ def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vect
 
 
 def turned(form: str, here: float, angle: float, *, known: bool) -> float:
-    """The angle at which a rotary axis arrives: on the shortest way, or in the positive or negative sense, rad."""
+    """The end angle, rad, of a rotary axis from `here` to `angle`: by the shortest way (DC), or in a sense (ACP, ACN).
+
+    known  whether `here` is known; if not, the end is `angle`
+    """
     if not known or (form == SHORTEST_WAY and abs(angle - here) < math.radians(HALF_A_TURN)):
         return angle
     step = (angle - here + STILL) % TURN - STILL
@@ -92,7 +95,7 @@ def turned(form: str, here: float, angle: float, *, known: bool) -> float:
 
 
 def polar(control: Sinumerik, words: BlockWordValues, program: Vector, lost: UnknownAxes) -> int:
-    """Take AP and RP, about the pole, in the plane; the coordinates that they move, as bits."""
+    """Apply AP and RP about the pole to the position `program`; returns the axes of the plane as a bit mask."""
     plane, pole = control.modal.plane, control.modes.pole
     angle, radius = (polar_word(control, words, address) for address in ("AP", "RP"))
     why = doubtful_polar_word(control, words, program, radius)
@@ -109,10 +112,10 @@ def polar(control: Sinumerik, words: BlockWordValues, program: Vector, lost: Unk
 
 
 def doubtful_polar_word(control: Sinumerik, words: BlockWordValues, here: Vector, radius: float | None) -> str:
-    """Why nobody can say where polar words lead, though they are known.
+    """Why the end of polar words is uncertain though they are known; "" if it is certain.
 
-    A radius of zero means the distance of the start. A radius alone goes with the angle of the start, or with the last
-    one; increments count from either. So the axes must stand where the last polar words have led them.
+    A radius of zero means the distance of the start from the pole. An omitted angle, or an increment, may refer to the
+    start or to the last polar words. So the axes must be at the end of the last polar words.
     """
     plane = control.modal.plane
     doubled = [letter for letter in "XYZ" if letter in words.values and INDEX[letter] in plane.pair]
@@ -128,7 +131,7 @@ def doubtful_polar_word(control: Sinumerik, words: BlockWordValues, here: Vector
 
 
 def stands_there(control: Sinumerik, here: Vector, angle: float | None, distance: float | None) -> bool:
-    """Whether the axes stand at this angle and distance about the pole, as far as they are given."""
+    """Whether the axes are at this angle, rad, and distance, mm, from the pole; None: not checked."""
     plane, pole = control.modal.plane, control.modes.pole
     if pole is None or control.lost_in_frame().keys() & set(plane.pair):
         return False
@@ -141,12 +144,12 @@ def stands_there(control: Sinumerik, here: Vector, angle: float | None, distance
 
 
 def doubtful_polar(control: Sinumerik, words: BlockWordValues) -> str:
-    """Why a motion with polar coordinates is refused whose radius might be meant as a diameter."""
+    """Why a motion with polar coordinates is refused while X is a diameter; "" if it is not."""
     return POLAR_DIAMETER if control.modal.diameter and {"AP", "RP"} & words.values.keys() else ""
 
 
 def polar_word(control: Sinumerik, words: BlockWordValues, address: str) -> float | None:
-    """AP in rad or RP in mm: as written, added to the last one, or the last one."""
+    """AP, rad, or RP, mm: absolute, incremental to the last one, or the last one if omitted; None if unknown."""
     before = control.modes.polar[0 if address == "AP" else 1]
     if address not in words.values:
         return before
@@ -161,7 +164,7 @@ def polar_word(control: Sinumerik, words: BlockWordValues, address: str) -> floa
 
 
 def set_pole(control: Sinumerik, words: BlockWordValues, code: int) -> None:
-    """G110 to G112: the pole is given from where the axes stand, in the frame, or from the last pole."""
+    """G110, G111, G112: set the pole relative to the current position, the zero point, or the last pole."""
     plane = control.modal.plane
     base: tuple[float, float] | None = (0.0, 0.0)
     if code == 1100:
@@ -185,7 +188,7 @@ def set_pole(control: Sinumerik, words: BlockWordValues, code: int) -> None:
 
 
 def where_it_stands(control: Sinumerik) -> tuple[float, float] | None:
-    """Where the axes of the plane stand in the frame; None where that is not known."""
+    """The position in the plane in program coordinates, mm; None if unknown."""
     here, plane = control.program_position(), control.modal.plane
     control.use_all_start_positions()
     axes = plane.pair
@@ -195,9 +198,10 @@ def where_it_stands(control: Sinumerik) -> tuple[float, float] | None:
 
 
 def machine_destination(control: Sinumerik, words: BlockWordValues) -> MotionEnd:
-    """The command at which a motion in machine coordinates (SUPA, G53, G153) ends: frames off, the tool's length on.
+    """The command at the end of a motion in machine coordinates (SUPA, G53, G153): without frames, with tool length.
 
-    A swivelled plane is a frame: without it the words are those of the machine's axes. TRAORI keeps them the tip's.
+    A swivelled plane is a frame: without it the words are positions of the machine axes. With TRAORI they remain those
+    of the tip.
     """
     if POLAR & words.values.keys():
         raise Fault(BAD_POLAR, "polar coordinates do not go with machine coordinates")
@@ -212,7 +216,7 @@ def machine_destination(control: Sinumerik, words: BlockWordValues) -> MotionEnd
 
 
 def axes_of_machine(control: Sinumerik, words: BlockWordValues) -> tuple[dict[int, float], UnknownAxes]:
-    """Where words lead axes of the machine, mm and rad, the tool's length on; and why that is not known."""
+    """Machine axis positions by the words, mm and rad, with tool length; and reasons for unknown ones, by axis."""
     axes, unsure = dict[int, float](), dict[int, str]()
     for letter in LETTERS:
         if letter in words.values:
@@ -228,7 +232,7 @@ def axes_of_machine(control: Sinumerik, words: BlockWordValues) -> tuple[dict[in
 def place_at_machine(
     control: Sinumerik, words: BlockWordValues, letter: str, target: Vector, unknown: UnknownAxes
 ) -> None:
-    """Take one axis word in machine coordinates."""
+    """Apply one axis word in machine coordinates to the position `target`."""
     index, value = INDEX[letter], words.values[letter]
     if control.counts_on(words.forms.get(letter, "")):
         target[index] += step_of(control, letter, value)
@@ -244,7 +248,7 @@ def place_at_machine(
 
 
 def step_of(control: Sinumerik, letter: str, value: float | None) -> float:
-    """What a word in machine coordinates says, mm and rad: no frame scales it."""
+    """The value of a word in machine coordinates, mm or rad, without the scale of a frame; 0 if unknown."""
     index = INDEX[letter]
     if control.rotary[index]:
         return control.of_setup(letter) * (value or 0.0)

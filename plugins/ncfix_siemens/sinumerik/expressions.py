@@ -1,10 +1,8 @@
-"""The expressions of SINUMERIK: numbers and texts.
+"""Expressions of SINUMERIK with numbers and texts; R parameters and variables of program, subprograms and setup.
 
-Angles are degrees; places in a text count from zero.
+Angles are degrees; positions in a text count from zero.
 Source: Siemens, "SINUMERIK 840D sl, NC programming, job planning", arithmetic functions, priority of the operations,
 string operations.
-
-R parameters and variables: those of the program, of each subprogram, and what the setup gives.
 """
 
 from __future__ import annotations
@@ -33,13 +31,13 @@ from ncfix_siemens.sinumerik.blocks import BRACKET
 
 CONSTANTS: dict[str, Value] = {"true": 1.0, "false": 0.0, "$pi": math.pi}
 CUTTING = dict.fromkeys(("$p_istest", "$p_sim", "$p_search", "$p_searchl", "$p_dryrun"), 0.0)
-"""Whether a program is tested, simulated, searched or run dry: not while it cuts."""
+"""System variables of program test, simulation, block search and dry run: false while the program cuts."""
 INITIAL: dict[str, Value] = {"real": 0.0, "int": 0.0, "bool": 0.0, "string": "", "char": Unknown(), "axis": Unknown()}
 WHOLE = frozenset({"int", "char"})
 
 
 MOST_CELLS = 100_000
-"""Elements of an array that is filled; those of a larger one count as known only at run time."""
+"""Largest number of elements of an array that is filled; larger arrays count as unknown."""
 
 
 @mutable
@@ -47,8 +45,8 @@ class Local:
     """The variables that one program has defined.
 
     kinds   name -> type
-    sizes   array -> how many elements it has in each direction
-    values  what they are
+    sizes   array -> its size in each dimension
+    values  variable or element -> value
     """
 
     kinds: dict[str, str] = field(default_factory=dict)
@@ -58,11 +56,11 @@ class Local:
 
 @mutable
 class SinumerikVariables:
-    """All variables; what nobody has set is known only at run time.
+    """All variables; those never set are known only at run time.
 
-    shared  R parameters and whatever the control has of its own
-    scopes  the program's own variables, those of the subprogram being executed last
-    changes how often a variable has got another value
+    shared  R parameters and variables of the control
+    scopes  variables defined by the main program, then by each active subprogram
+    changes number of changes of values so far
     """
 
     shared: dict[Key, Value] = field(default_factory=dict)
@@ -71,11 +69,11 @@ class SinumerikVariables:
 
     @classmethod
     def given(cls, variables: Mapping[str, float]) -> SinumerikVariables:
-        """What a setup gives: `R1`, `_GUD`, `$MC_NAME`, `NAME[1,2]`."""
+        """The variables given in a setup: `R1`, `_GUD`, `$MC_NAME`, `NAME[1,2]`."""
         return cls({key_of(name): value for name, value in variables.items()})
 
     def value(self, key: Key) -> Value:
-        """The value of a variable; unknown if nobody has set it."""
+        """The value of a variable; unknown if it was never set."""
         name = name_of(key)
         if name in CONSTANTS:
             return CONSTANTS[name]
@@ -87,7 +85,7 @@ class SinumerikVariables:
         return scope.values.get(key, INITIAL.get(scope.kinds[name], Unknown()))
 
     def assign(self, key: Key, value: Value) -> None:
-        """Set a variable; whole ones round."""
+        """Assign a value to a variable; integer variables round it."""
         name = name_of(key)
         scope = self.scope_of(name)
         before = self.value(key)
@@ -100,11 +98,11 @@ class SinumerikVariables:
         self.changes += self.value(key) != before
 
     def scope_of(self, name: str) -> Local | None:
-        """The innermost program that has defined a name, the main program at last."""
+        """The scope that defines a name: that of the current subprogram, else of the main program; None if neither."""
         return next((scope for scope in (self.scopes[-1], self.scopes[0]) if name in scope.kinds), None)
 
     def define(self, kind: str, name: str, sizes: tuple[int, ...] = ()) -> None:
-        """`DEF`: the variable begins anew."""
+        """`DEF`: define a variable, with its initial value."""
         scope = self.scopes[-1]
         self.changes += any(name_of(key) == name for key in scope.values)
         scope.kinds[name], scope.sizes[name] = kind, sizes
@@ -112,7 +110,7 @@ class SinumerikVariables:
             del scope.values[key]
 
     def fill(self, name: str, index: tuple[Value, ...], values: Sequence[Value], *, repeated: bool) -> None:
-        """`NAME[index]=SET(values)` from an element on; repeated: `REP(value)` or `REP(value, count)`."""
+        """`NAME[index]=SET(values)`: assign elements from an index on; repeated: `REP(value)`, `REP(value, count)`."""
         scope = self.scope_of(name)
         sizes = () if scope is None else scope.sizes.get(name, ())
         small = sizes if math.prod(sizes) <= MOST_CELLS else ()
@@ -128,7 +126,7 @@ class SinumerikVariables:
             self.assign((name, cell), value)
 
     def forget(self, name: str) -> None:
-        """All elements of an array are known only at run time from here on."""
+        """Make a variable, or all elements of an array, unknown."""
         scope = self.scope_of(name)
         self.changes += 1
         if scope is None:
@@ -139,7 +137,7 @@ class SinumerikVariables:
 
 
 def renamed(values: Mapping[Key, Value], name: str, other: str) -> dict[Key, Value]:
-    """The elements of an array as those of another."""
+    """The elements of an array under the name of another."""
     return {
         (other, key[1]): value for key, value in values.items() if name_of(key) == name and not isinstance(key, str)
     }
@@ -163,7 +161,7 @@ Key = str | tuple[str, tuple[float, ...]]
 
 COMPARISONS = frozenset({"==", "<>", ">", "<", ">=", "<="})
 EQUAL = 1e-12
-"""Relative difference up to which two numbers are equal (MD10280)."""
+"""Largest relative difference of equal numbers (MD10280)."""
 
 OPERATORS: dict[str, Callable[[float, float], float]] = {
     **SUMS,
@@ -193,13 +191,13 @@ FUNCTIONS_OF_NUMBERS: dict[str, tuple[Callable[..., float], int]] = {
 
 
 def substring(text: str, start: float, length: float | None = None) -> str:
-    """`SUBSTR`."""
+    """The value of `SUBSTR`."""
     first = int(start)
     return text[first:] if length is None else text[first : first + int(length)]
 
 
 def as_number(text: str) -> float | None:
-    """`NUMBER`, None where the control would stop."""
+    """The value of `NUMBER`; None if the control would stop."""
     try:
         return float(text.upper().replace("EX", "E"))
     except ValueError:
@@ -207,7 +205,7 @@ def as_number(text: str) -> float | None:
 
 
 def of_kind(kind: str, value: Value) -> Value:
-    """A value as a variable of a type keeps it."""
+    """A value converted to the type of a variable."""
     plain = number(value)
     if plain is None or kind not in {"bool", *WHOLE}:
         return value
@@ -215,7 +213,7 @@ def of_kind(kind: str, value: Value) -> Value:
 
 
 def constant(text: str) -> Value:
-    """What a number, a text in quotes, TRUE or FALSE stands for; other things only the control knows."""
+    """The value of a number, a text in quotes, TRUE or FALSE; unknown for other text."""
     if len(text) > 1 and text[0] == text[-1] == '"':
         return text[1:-1]
     value = as_number(text)
@@ -233,11 +231,11 @@ TEXT_FUNCTIONS: dict[str, tuple[Callable[..., Value | None], tuple[type, ...], i
     "isnumber": (lambda text: float(as_number(text) is not None), (str,), 1),
     "number": (as_number, (str,), 1),
 }
-"""Name -> the function, the types of its arguments, and how many of them it needs."""
+"""Name -> function, types of its arguments, smallest number of arguments."""
 
 
 def of_texts(name: str, values: tuple[Value, ...]) -> Value:
-    """The value of a function of texts; unknown where an argument is not known or of another type."""
+    """The value of a text function; unknown if an argument is unknown or of another type."""
     function, types, least = TEXT_FUNCTIONS[name]
     fits = least <= len(values) <= len(types)
     if not fits or any(not isinstance(value, kind) for value, kind in zip(values, types, strict=False)):
@@ -280,7 +278,7 @@ class VariableExpressions(Expressions):
         return evaluate
 
     def function(self, name: str, arguments: tuple[Evaluate, ...], address: str = "") -> Evaluate:
-        """Brackets, functions of numbers and of texts; what is none of ours has a value that only the control knows."""
+        """Brackets, functions of numbers and of texts; the value of other functions is unknown."""
         if name == BRACKET:
             return arguments[0]
         if name == "<<":
@@ -292,7 +290,7 @@ class VariableExpressions(Expressions):
     def operator(self, operator: str, left: Expression, right: Expression, address: str = "") -> Evaluate:
         """An operator between two operands; `<<` joins texts.
 
-        Of a comparison of two without brackets, or of a sum of truths, controls and people do not think alike: unknown.
+        A comparison of comparisons or logical operations without brackets is unknown, since its precedence is doubtful.
         """
         if operator == "<<":
             first, second = self.compiled(left), self.compiled(right)
@@ -306,12 +304,12 @@ class VariableExpressions(Expressions):
 
 
 def is_loose(side: Expression) -> bool:
-    """Whether a side of a comparison is one itself, or a logical operation, without brackets."""
+    """Whether an operand of a comparison is a comparison or logical operation without brackets."""
     return isinstance(side, Binary) and side.operator in COMPARISONS | {"and", "or", "xor"}
 
 
 def compared(operator: str, left: Value, right: Value) -> Value:
-    """Two values compared; 1 for true."""
+    """The result of a comparison, 1 or 0; unknown if the values are unknown or of different types."""
     if isinstance(left, Unknown) or isinstance(right, Unknown) or isinstance(left, str) != isinstance(right, str):
         return Unknown()
     if isinstance(left, str) or isinstance(right, str):
@@ -324,12 +322,12 @@ def compared(operator: str, left: Value, right: Value) -> Value:
 
 
 def shown(value: Value) -> Value:
-    """A value as the text that `<<` makes of it."""
+    """A value converted to text, as by `<<`."""
     return value if isinstance(value, Unknown | str) else f"{value:.15g}"
 
 
 def joined(left: Value, right: Value) -> Value:
-    """Two texts as one."""
+    """Two values joined as text."""
     first, second = shown(left), shown(right)
     return Unknown() if isinstance(first, Unknown) or isinstance(second, Unknown) else f"{first}{second}"
 

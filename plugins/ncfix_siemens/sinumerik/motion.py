@@ -1,6 +1,6 @@
-"""What one block moves: straight lines, arcs, machine coordinates, reference points, and what is not followed.
+"""The motion of one block: lines, arcs, machine coordinates, reference points, refused motions; synchronized actions.
 
-Synchronized actions: what the control may do at any time while the blocks that follow are executed.
+A synchronized action may be executed at any time during the blocks that follow.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ _ACTION = r"""
     | [MHS]\d*=?[\d.]+ | (?:SETAL|LOCK|UNLOCK|RESET|CANCEL)\([^()]*\) | RDISABLE
 """
 HARMLESS = re.compile(rf"(?:(?:{_ACTION})\s*)+", re.IGNORECASE | re.VERBOSE)
-"""Actions that move no axis, change no coordinates and no variable that the program computes with."""
+"""Actions that move no axis, and change no coordinates and no variable that the program uses."""
 
 DO = re.compile(r"\bDO\b", re.IGNORECASE)
 AROUND_EQUALS = re.compile(r"\s*=\s*")
 
 
 def is_harmless(text: str) -> bool:
-    """Whether a synchronized action may act at any time, and nothing that is followed changes."""
+    """Whether a synchronized action cannot affect anything that is followed."""
     _, *actions = DO.split(AROUND_EQUALS.sub("=", text.split(";")[0]), maxsplit=1)
     return bool(actions) and HARMLESS.fullmatch(actions[0].strip()) is not None
 
 
 EVERY_BLOCK = re.compile(r"[ \t]*IDS?[ \t]*=", re.IGNORECASE)
 WITHIN_A_BLOCK = re.compile(r"\$AC_(?:PATHN|PLT[BE]B|DT[BE][BW]|TIME[CS]{0,2})(?!\w)", re.IGNORECASE)
-"""How far the motion of a block is, its time too."""
+"""System variables of the progress of a block, in path or time."""
 
 
 def watch(control: Sinumerik, text: str) -> None:
-    """A harmless synchronized action comes into force: for the next block, or with ID for all that follow."""
+    """Take a harmless synchronized action into force: for the next block, or with ID for all that follow."""
     control.acting |= EVERY_BLOCK.match(text) is None
     if WITHIN_A_BLOCK.search(text):
         control.modes.by_block |= {"actions"}
@@ -61,19 +61,19 @@ SOFT_APPROACH = frozenset({1470, 1480, 2470, 2480, 3470, 3480})
 BY_ANGLE = "a contour that is given by an angle (ANG)"
 AFTER_APPROACH = "where the axis {} stands after a soft approach or retraction is not followed"
 CORNERS = frozenset({"RND", "CHF", "CHR"})
-"""Words with which the control rounds or breaks the corner at the end of the block."""
+"""Words of a rounding or chamfer at the end of the block."""
 
 CIP, CT = MOTIONS["cip"], MOTIONS["ct"]
 OTHER_WAYS = UNFOLLOWED_MOTIONS.keys() | {20, 30, CIP, CT}
-"""Motion codes with which an axis word is no straight motion."""
+"""Motion codes whose motions are no straight lines."""
 
 
 TAKING = {20: ("G2", OF_ARCS), 30: ("G3", OF_ARCS), CIP: ("CIP", OF_CIP), CT: ("CT", frozenset({"TURN"}))}
-"""Motions that take words of arcs; centre words beside a straight motion lead nowhere."""
+"""Motion code -> its name, and the arc words that it takes."""
 
 
 def moved(control: Sinumerik, words: BlockWordValues, special: frozenset[str]) -> None:
-    """The motion of a block; `special` says what applies to this block only (`supa`, `meas`, ...)."""
+    """Execute the motion of a block; special: statements for this block only (`supa`, `meas`, ...)."""
     code = control.modal.motion
     if code in (0, 10):
         control.modal.straight = code
@@ -102,7 +102,7 @@ def moved(control: Sinumerik, words: BlockWordValues, special: frozenset[str]) -
 
 
 def by_itself(control: Sinumerik, words: BlockWordValues, special: frozenset[str], machine: str) -> None:
-    """A motion with which nothing is drilled; `machine` says by which name it is in machine coordinates."""
+    """Execute a motion without a hole; machine: the statement of machine coordinates, or ""."""
     if machine:
         to_machine_position(control, words, machine.upper())
     elif "meas" in special:
@@ -115,7 +115,7 @@ def by_itself(control: Sinumerik, words: BlockWordValues, special: frozenset[str
 
 
 def straight(control: Sinumerik, words: BlockWordValues, code: int) -> None:
-    """G0 and G1."""
+    """Execute a straight motion, G0 or G1."""
     end = destination(control, words)
     control.go(MotionKind.FEED if code else MotionKind.RAPID, words, end, code, refusal=refusal_of(control, words))
     if "ANG" in words.values:
@@ -124,16 +124,14 @@ def straight(control: Sinumerik, words: BlockWordValues, code: int) -> None:
 
 
 def is_one_piece(control: Sinumerik, words: BlockWordValues) -> bool:
-    """Whether a motion must not be split: its time or feed would be another's, REPEAT would miss lines, or what acts
-    by blocks would act otherwise.
-    """
+    """Whether a motion must not be split: because of its time or feed, REPEAT, or effects that act by blocks."""
     timed = control.modal.feed_mode == 93 and control.modal.motion != 0 and "F" not in words.values
     by_block = control.acting or bool(control.modes.by_block)
     return timed or "FB" in words.values or words.block in control.solitary or by_block
 
 
 def as_coded(control: Sinumerik, words: BlockWordValues, code: int) -> None:
-    """The motion that the code in force makes of the words."""
+    """Execute the words by the motion code in force."""
     name, taken = TAKING.get(code, (f"G{code // 10}", frozenset({*CENTRE_LETTERS, "ANG"})))
     why = "" if code in UNFOLLOWED_MOTIONS else misled(control, words, name, taken)
     if why:
@@ -152,7 +150,7 @@ def as_coded(control: Sinumerik, words: BlockWordValues, code: int) -> None:
 
 
 def refusal_of(control: Sinumerik, words: BlockWordValues) -> str:
-    """Why a straight motion is refused, though its end is known."""
+    """Why a straight motion is refused though its end is known; "" if it is not."""
     if words.values.keys() & {"RND", "RNDM", "CHF", "CHR", "ANG"} and words.unknown("RND", "RNDM", "CHF", "CHR"):
         return "a rounding or chamfer is known only at run time"
     if "ANG" in words.values:
@@ -161,13 +159,13 @@ def refusal_of(control: Sinumerik, words: BlockWordValues) -> str:
 
 
 def refused(control: Sinumerik, words: BlockWordValues, code: int, why: str) -> None:
-    """A motion that is followed only as far as its end."""
+    """Add a refused motion, of which only the end is followed."""
     control.use_all_start_positions()
     control.go(MotionKind.FEED, words, destination(control, words), code, refusal=why)
 
 
 def to_machine_position(control: Sinumerik, words: BlockWordValues, name: str) -> None:
-    """SUPA, G53 and G153."""
+    """Execute a motion in machine coordinates: SUPA, G53, G153."""
     end = machine_destination(control, words)
     code = control.modal.motion if control.modal.motion in (0, 10) else control.modal.straight
     kind = MotionKind.RAPID if code == 0 else MotionKind.FEED
@@ -175,7 +173,7 @@ def to_machine_position(control: Sinumerik, words: BlockWordValues, name: str) -
 
 
 def measure(control: Sinumerik, words: BlockWordValues) -> None:
-    """MEAS: towards the words until the probe switches."""
+    """Execute MEAS: a motion towards the words until the probe switches; the end is unknown."""
     end = destination(control, words)
     moved = [i for i in control.axis_indices if end.target[i] != control.position[i] or i in end.unknown]
     gone = dict.fromkeys(moved, AFTER_MEASURING)
@@ -185,7 +183,7 @@ def measure(control: Sinumerik, words: BlockWordValues) -> None:
 
 
 def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
-    """G74 and G75: the axes named, `X1=0` among them, go to a point that the machine knows."""
+    """Execute G74 and G75: the named axes (also `X1=0`) move to a fixed point of the machine."""
     named = [INDEX[address[0]] for address in words.values if address[:1] in INDEX]
     gone = tuple(index for index in dict.fromkeys(named) if index in control.axis_indices)
     reasons = dict.fromkeys((*gone, *(GEOMETRY if gone and control.tcp else ())), AFTER_REFERENCE)
@@ -197,5 +195,5 @@ def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
 
 
 def dwell(control: Sinumerik, words: BlockWordValues) -> None:
-    """G4: F is seconds, S turns of the spindle."""
+    """Execute G4, a dwell: F seconds, or S revolutions."""
     control.go(MotionKind.DWELL, BlockWordValues(words.block), control.here(), control.modal.motion, passing=DWELL)

@@ -1,20 +1,19 @@
-"""The direction of the tool as programs give it under TRAORI, and the plane of CYCLE800: made into rotary positions.
+"""Rotary positions from the direction of the tool under TRAORI, and from the tilted plane of CYCLE800.
 
-A3 B3 C3 are a vector in the coordinates of the program, of any length; a component that is not written is zero. A2 B2
-C2 are angles by which a vector along Z is turned, in the sense that ORIEULER, ORIRPY or ORIRPY2 says, or machine data
-where none of them does. Which of two ways the rotary axes take is for the machine data, too: here it is the nearest.
+A3 B3 C3 are a vector in program coordinates, of any length; an omitted component is zero. A2 B2 C2 are angles that
+rotate a vector along Z, as ORIEULER, ORIRPY or ORIRPY2 states, or else machine data. Machine data also choose between
+the two solutions of the rotary axes; here the nearest is taken.
 Source: Siemens, "SINUMERIK 840D sl, NC programming, job planning": orientation programming (TRAORI).
 
-Stretches of straight motions with vectors are taken all at once: X Y Z go by the fast lane; the rotary axes are worked
-out motion after motion, since where they go depends on where they stand. What there is to say of, to refuse, or to keep
-in one piece ends the stretch, and goes block by block.
+Stretches of straight motions with vectors are executed at once: X Y Z by the fast lane, the rotary axes motion after
+motion, since the solution depends on the position before. A motion that needs a warning, a refusal or must not be split
+ends the stretch, and is executed as a single block.
 
-CYCLE800: a tilted plane, and rotary axes that turn until the tool stands square to it.
-
-X Y Z are then those of the tip in a frame that the workpiece carries, whatever the rotary axes do: the control works
-the swivelled geometry into the frames. `p -> X0 + turn @ (X1 + p)`, the turns one after another about the axes as the
-ones before have left them, in the order of the mode. Solid angles turn about Z, then about Y; projected angles are
-those of the plane's traces in the planes of the axes.
+CYCLE800 tilts the plane and turns the rotary axes until the tool is perpendicular to it. X Y Z are then positions of
+the tip in a frame fixed to the workpiece, whatever the rotary axes do: the control includes the swivelled geometry in
+the frames. A point p is mapped to X0 + turn @ (X1 + p). The rotations follow one another about the rotated axes, in the
+order of the mode. Solid angles rotate about Z, then about Y; projected angles are those of the plane's traces in the
+coordinate planes.
 Source: Siemens, "SINUMERIK Operate, milling": CYCLE800, external programming (_FR, _TC, _ST, _MODE, _X0 ... _DIR).
 """
 
@@ -65,19 +64,19 @@ ON_CURVES = ("oricon", "oricurve", "oripath")
 BY_CURVE = "the tool turns on a cone, or after a curve ({})"
 
 LONGEST = 1 << 10
-"""Blocks that are taken at once; where one ends the stretch, those behind it were taken in vain."""
+"""Largest number of blocks of a stretch; directions behind the block that ends it were computed in vain."""
 
 ORDER = {1: "X", 2: "Y", 3: "Z"}
-"""The axes in the bits of the mode."""
+"""Two bits of the mode -> axis of rotation."""
 
 AXIS_BY_AXIS, SOLID, PROJECTED = 0, 1, 2
-"""The kinds of angles in its bits 6 and 7."""
+"""Kinds of angles, in bits 6 and 7 of the mode."""
 
 DESELECTED = "0"
-"""The name of a swivel data set with which swivelling is deselected; the rotary axes stand where they stand."""
+"""Name of the swivel data set that deselects swivelling; the rotary axes do not move."""
 
 PLACES = {"fr": 0, "st": 2, "mode": 3, "before": 4, "angles": 7, "after": 10, "dir": 13}
-"""Where the arguments stand: retraction, state, mode, reference point, angles, zero point, direction."""
+"""Indices of the arguments: retraction, state, mode, reference point, angles, zero point, direction."""
 
 SWIVEL = Passing(Pass.ALIGNMENT, "swivelling (CYCLE800)")
 UNFOLLOWED = "a tilted plane (CYCLE800{}) is in force, which ncfix does not follow"
@@ -90,7 +89,7 @@ AFTER_SWIVEL = "where the axis {} stands after swivelling (CYCLE800) is not foll
 
 
 def oriented(control: Sinumerik, words: BlockWordValues) -> None:
-    """Give the block the rotary words that its direction of the tool amounts to, or the reason why it is refused."""
+    """Add rotary words to a block for its tool direction, or the reason why it is refused."""
     if leads_along(control):
         words.refuse(ALONG_PATH.format(control.modes.orientation.upper()), control.turning)
         return
@@ -106,12 +105,12 @@ def oriented(control: Sinumerik, words: BlockWordValues) -> None:
 
 
 def leads_along(control: Sinumerik) -> bool:
-    """Whether each motion turns the tool, as the path turns."""
+    """Whether the tool orientation follows the path (ORIPATH)."""
     return control.modes.transformed and control.modes.orientation.startswith(BY_PATH)
 
 
 def by_direction(control: Sinumerik, words: BlockWordValues) -> str:
-    """Take A3 B3 C3 or A2 B2 C2; why the motion is refused, if it is."""
+    """Convert A3 B3 C3 or A2 B2 C2 to rotary words; returns why the motion is refused, "" if it is not."""
     if not control.modes.transformed:
         return NOT_ON
     if words.unknown(*VECTOR, *ANGLES):
@@ -152,7 +151,7 @@ def by_direction(control: Sinumerik, words: BlockWordValues) -> str:
 
 
 def by_angles(control: Sinumerik, words: BlockWordValues) -> Triple | None:
-    """The direction that A2 B2 C2 say, as a vector; None where nobody says how they are meant."""
+    """The tool direction by A2 B2 C2 as a vector; None if their meaning is not known."""
     euler = number(control.variables.value(MEANT.strip('"').lower()))
     default = "" if euler is None else "orieuler" if euler else "orirpy"
     meant = control.modes.angles or default
@@ -168,14 +167,14 @@ TURNS = {
     "orirpy": (("Z", "C2"), ("Y", "B2"), ("X", "A2")),
     "orirpy2": (("X", "A2"), ("Y", "B2"), ("Z", "C2")),
 }
-"""About which axis, as the turns before have left it, and by which word."""
+"""Meaning of A2 B2 C2 -> successive rotations: (rotated axis, word of the angle)."""
 
 
 # -- many at once ------------------------------------------------------------------------------------------------------
 
 
 def run_vectors(control: Sinumerik, unit: SinumerikUnit, block: int, main: bool) -> int:
-    """Take the stretch that begins with a block; the number of blocks taken, 0 for none."""
+    """Execute the stretch of blocks with vectors that begins with a block; the number of blocks executed."""
     stop = min(unit.vector_end(block), block + LONGEST)
     if stop - block < SHORTEST or not is_ready(control) or not is_open(control, unit, block):
         return 0
@@ -202,7 +201,7 @@ def run_vectors(control: Sinumerik, unit: SinumerikUnit, block: int, main: bool)
 
 
 def is_ready(control: Sinumerik) -> bool:
-    """Whether directions of the tool can be followed many at a time."""
+    """Whether tool directions of many blocks can be followed at once."""
     modes, modal = control.modes, control.modal
     plain = not modal.incremental and modal.feed_mode != FeedMode.INVERSE_TIME and control.tools.offset is not None
     followed = modes.transformed and not modes.orientation.startswith(ON_CURVES)
@@ -210,7 +209,7 @@ def is_ready(control: Sinumerik) -> bool:
 
 
 def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Sequence[Ways], stage: BlockRows) -> int:
-    """Put the rotary axes of a stage where one of two ways leads them; up to which motion that goes without saying."""
+    """Set the rotary positions of a stage to the nearest solutions; the number of motions until a decision is needed."""
     first, second = letters
     (scale, other_scale), (offset, other_offset) = (
         [each[i] for i in letters] for each in (control.scale, control.offset)
@@ -238,7 +237,7 @@ def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Seque
 
 
 def swivel(control: Sinumerik, block: int, step: Calling) -> None:
-    """CYCLE800: without arguments it takes the tilt away, with them it tilts the plane."""
+    """CYCLE800: without arguments it resets the plane, with arguments it tilts it."""
     control.resume("tilt")
     if control.frames.programmable != WORLD:
         control.suspend("frame", OVER_FRAME)
@@ -270,11 +269,11 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
 class SwivelPlane:
     """The arguments of CYCLE800.
 
-    frame      of the plane
-    adds       it is added to the plane in force
-    direction  -1 or 1: which of two ways the rotary axes take; 0: they stand still
-    retracts   the axes retract before they turn
-    fault      why it is not followed, empty if it is
+    frame      frame of the plane
+    adds       whether it is added to the plane in force
+    direction  -1 or 1: which of two solutions the rotary axes take; 0: they do not move
+    retracts   whether the axes retract before the rotary axes turn
+    fault      why it is not followed; "" if it is
     """
 
     frame: Affine
@@ -285,7 +284,7 @@ class SwivelPlane:
 
     @classmethod
     def of(cls, values: list[float], unit: float) -> SwivelPlane:
-        """From the numbers of the call; `unit`: mm per unit of its lengths."""
+        """The plane by the arguments of a call; unit: mm per unit of its lengths."""
         mode, table = round(values[PLACES["mode"]]), round(values[PLACES["st"]])
         direction = round(values[PLACES["dir"]])
         before, angles, after = (values[PLACES[name] : PLACES[name] + 3] for name in ("before", "angles", "after"))
@@ -300,12 +299,12 @@ class SwivelPlane:
         return cls(frame, table % 10 == 1, direction, round(values[PLACES["fr"]]) != 0, fault)
 
     def within(self, before: Affine) -> Affine:
-        """The frame of the plane where another one was in force."""
+        """The resulting frame, given that `before` was in force."""
         return before.then(self.frame) if self.adds else self.frame
 
 
 def turn_of(mode: int, angles: Sequence[float]) -> Affine | None:
-    """How the plane is turned; None for modes that are not followed (rotary axes given directly)."""
+    """The rotation of the plane; None for modes that are not followed (rotary axes given directly)."""
     order = "".join(ORDER.get(mode >> shift & 3, "") for shift in (0, 2, 4))
     kind = mode >> 6
     if kind == SOLID:
@@ -320,14 +319,14 @@ def turn_of(mode: int, angles: Sequence[float]) -> Affine | None:
 
 
 def untilted(control: Sinumerik) -> None:
-    """Out of the tilted plane; the rotary axes stand where they stood."""
+    """Reset the tilted plane; the rotary axes do not move."""
     control.frames = replace(control.frames, plane=WORLD)
     control.modes.swivelled = False
     control.switch_tcp()
 
 
 def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
-    """Into a tilted plane: the frame, then the turn of the rotary axes."""
+    """Take a tilted plane into force, and turn the rotary axes."""
     take_plane(control, plane.within(control.frames.plane))
     axes = turn_square(control, plane)
     target, unknown = control.position[:], dict(control.unknown)
@@ -343,7 +342,7 @@ def tilted(control: Sinumerik, block: int, plane: SwivelPlane) -> None:
 
 
 def level(control: Sinumerik, plane: SwivelPlane) -> None:
-    """A plane that is not turned, while the rotary axes stand still: as they stand, the tool has to be square to it."""
+    """Take an unrotated plane into force without moving rotary axes; they must be at zero, else it is not followed."""
     control.use_start_positions(control.turning)
     whole = plane.within(control.frames.plane)
     if whole.rotation != WORLD.rotation or not rotary_at_zero(control, control.position, control.unknown):
@@ -356,16 +355,16 @@ def level(control: Sinumerik, plane: SwivelPlane) -> None:
 
 
 def take_plane(control: Sinumerik, frame: Affine) -> None:
-    """Make a frame that of the plane."""
+    """Set the frame of the plane."""
     control.frames = replace(control.frames, plane=frame, programmable=WORLD)
     control.modes.swivelled = True
     control.switch_tcp()
 
 
 def turn_square(control: Sinumerik, plane: SwivelPlane) -> dict[int, float]:
-    """Where the rotary axes stand when the tool is square to the plane; empty if that cannot be known.
+    """The rotary positions, rad, with the tool perpendicular to the plane; empty if unknown.
 
-    An axis of which it is not known where it stands counts as standing at zero.
+    An axis in an unknown position counts as being at zero.
     """
     if control.posture.pointing is None:
         return {}

@@ -1,4 +1,4 @@
-"""A plan for each shape of block: what its words, names and jumps are, as functions that give their values."""
+"""The plan of a block shape: its words, names, assignments and jumps, with functions that evaluate their values."""
 
 from __future__ import annotations
 
@@ -40,10 +40,11 @@ from ncfix_siemens.sinumerik.expressions import (
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS, SHORTEST_WAY, VECTOR
 
 DWELL_WORDS = "FS"
-"""With G4: how long."""
+"""Words of the duration of a dwell (G4)."""
 LISTS = frozenset({BRACKET, "set", "rep"})
+"""Functions that give values to several elements of an array."""
 OWN_FUNCTIONS = LISTS | FORMS | FUNCTIONS_OF_NUMBERS.keys() | TEXT_FUNCTIONS.keys() | {"<<"}
-"""What gives several elements their values."""
+"""Functions that ncfix evaluates."""
 
 ANY_PARAMETER = "r[]"
 LANE_LETTERS = INDEX.keys() | {"F", "N"}
@@ -53,7 +54,7 @@ ARC_LETTERS = frozenset({*CENTRE_LETTERS, RADIUS})
 
 @frozen
 class Setting:
-    """A word: its address, its value, and how it is meant (`ac`, `ic`, `dc`, ... or nothing)."""
+    """A word: its address, its value as a function, and its form (`ac`, `ic`, `dc`, ... or "")."""
 
     address: str
     value: Evaluate
@@ -61,16 +62,16 @@ class Setting:
     span: Span
 
     def unsure(self) -> Setting:
-        """The word with a value that nobody knows: its block sets a variable of it, before it reads it or after."""
+        """The word with an unknown value, as its block assigns a variable of it before or after it is read."""
         return replace(self, value=left_out)
 
 
 @frozen
 class AssignedVariable:
-    """A variable that gets a value: its name, the index if it is an element, and the value (None: a list).
+    """An assignment: the name of the variable, its index if it is an element, and the value (None: a list).
 
     listed    the values of a list, `SET(..)` or `REP(..)`
-    repeated  it is `REP`
+    repeated  whether the list is `REP`
     """
 
     name: str
@@ -83,7 +84,7 @@ class AssignedVariable:
 
 @frozen
 class Calling:
-    """A name with the values of its arguments, and these as written."""
+    """A name that is executed, with its arguments as functions, and as written."""
 
     name: str
     arguments: tuple[Evaluate, ...]
@@ -94,7 +95,7 @@ class Calling:
 
 @frozen
 class Branching:
-    """A control structure or jump; `composed`: the label of a jump, where it is put together (`"MARK"<<R1`)."""
+    """A control structure or jump; composed: the label of a jump as a function, if it is computed (`"MARK"<<R1`)."""
 
     keyword: str
     label: str
@@ -109,18 +110,18 @@ Step = AssignedVariable | Calling | Branching
 
 @mutable
 class SinumerikPlan:
-    """What is done with every block of a shape.
+    """The plan of all blocks of a shape.
 
-    settings   words but G and M with plain codes, and N
-    steps      assignments, names, jumps, in the order written
+    settings   words, without N and plain G and M codes
+    steps      assignments, names and jumps, in the order written
     g, m       codes in tenths
     axes       bit mask of the axis words
-    skip       the switches of block delete that it begins with (`/` is `/0`)
-    opaque     kinds of text that is passed over or not understood
-    lane       set if the block may go through the fast lane
-    functions  what stands in its expressions and only the control can evaluate
-    vector     the slots of A3 B3 C3, -1 for none, if a block for the fast lane has any of them
-    shortest   the axes that go the shortest way, `C=DC(350)`, as bits, if it is a block for the fast lane
+    skip       block skip levels at its beginning (`/` is `/0`)
+    opaque     kinds of text that is ignored or not understood
+    lane       layout for the fast lane, if the block may use it
+    functions  functions in its expressions that only the control can evaluate
+    vector     slots of A3 B3 C3, -1 for none, if a block for the fast lane has any
+    shortest   bit mask of the axes with `DC`, if it is a block for the fast lane
     """
 
     template: Template
@@ -160,7 +161,7 @@ def plan_of(template: Template) -> SinumerikPlan:
 
 
 def settings_of(template: Template) -> tuple[Setting, ...]:
-    """The words of a block but N and plain codes; unsure where the block itself sets a variable that they name."""
+    """The words of a block without N and plain codes; unsure if the block assigns a variable that they use."""
     words = [word for word in template.words if word.address not in ("N", ":") and not is_code(word)]
     let = {name for item in template.items if isinstance(item, Assignment) for name in names_in(item.target)}
     return tuple(setting(word).unsure() if names_one(let, word.value) else setting(word) for word in words)
@@ -172,7 +173,7 @@ def is_code(word: Word) -> bool:
 
 
 def setting(word: Word) -> Setting:
-    """A word with its value as a function."""
+    """A word as a setting, with its value as a function."""
     value = word.value
     if isinstance(value, FunctionCall) and value.name in FORMS and not value.indexed:
         inner = value.arguments[0] if value.arguments else None
@@ -181,7 +182,7 @@ def setting(word: Word) -> Setting:
 
 
 def names_one(names: set[str], expression: Expression) -> bool:
-    """Whether an expression may name one of these variables."""
+    """Whether an expression may use one of these variables."""
     named = set(names_in(expression))
     if named & names:
         return True
@@ -190,12 +191,12 @@ def names_one(names: set[str], expression: Expression) -> bool:
 
 
 def is_parameter(name: str) -> bool:
-    """Whether it is an R parameter."""
+    """Whether a name is that of an R parameter."""
     return name == ANY_PARAMETER or (name[0] == "r" and name[1:].isdigit())
 
 
 def names_in(expression: Expression) -> Iterator[str]:
-    """The variables that an expression names; an R parameter with a computed number may be any."""
+    """The variables that an expression uses; an R parameter with a computed number is `ANY_PARAMETER`."""
     for part in parts_in(expression):
         match part:
             case NumberedParameter(Constant(number)):
@@ -212,7 +213,7 @@ def has_value(variables: SinumerikVariables, name: str) -> bool:
 
 
 def parts_in(expression: Expression) -> Iterator[Expression]:
-    """An expression and all that stand in it."""
+    """An expression and all of its parts."""
     yield expression
     match expression:
         case NumberedParameter(inner) | Unary(_, inner):
@@ -247,7 +248,7 @@ def letting(item: Assignment) -> AssignedVariable:
 
 
 def target_of(item: Assignment) -> tuple[str, tuple[Evaluate, ...]]:
-    """The variable that gets a value, and the index if it is an element."""
+    """The variable of an assignment, and the index if it is an element."""
     match item.target:
         case NumberedParameter(number):
             return "r", (compiled(number),)
@@ -259,7 +260,7 @@ def target_of(item: Assignment) -> tuple[str, tuple[Evaluate, ...]]:
 
 
 def evaluates(arguments: tuple[Expression | None, ...]) -> tuple[Evaluate, ...]:
-    """Arguments as functions; those that are left out are known only at run time."""
+    """Arguments as functions; omitted ones give an unknown value."""
     return tuple(left_out if part is None else compiled(part) for part in arguments)
 
 
@@ -275,7 +276,7 @@ def branching(item: OWordLine) -> Branching:
 
 
 def lane_of(plan: SinumerikPlan) -> Lane | None:
-    """The fast lane's view of a plan, if the block is nothing but a straight motion or an arc with plain numbers."""
+    """The fast lane's layout of a block that is only a straight motion or an arc with plain numbers; else None."""
     template, fixed = plan.template, fixed_centre(plan.template)
     words = [word for word in template.words if not is_code(word)]
     slots = {**template.slots, **fixed, **in_form(template, "ABC", SHORTEST_WAY)}
@@ -295,12 +296,12 @@ def lane_of(plan: SinumerikPlan) -> Lane | None:
 
 
 def fixed_centre(template: Template) -> dict[str, int]:
-    """The words of a centre that count from the origin, `I=AC(5)`: the slots of their numbers."""
+    """Absolute words of a centre, `I=AC(5)`: address -> slot of the number."""
     return in_form(template, CENTRE_LETTERS, ABSOLUTE)
 
 
 def in_form(template: Template, letters: Container[str], form: str) -> dict[str, int]:
-    """The words with some addresses that have a plain number in a form, `I=AC(5)`: the slots of their numbers."""
+    """Words of some addresses with a plain number in a form, `I=AC(5)`: address -> slot of the number."""
     found = {}
     for word in template.words:
         match word.value:
@@ -310,12 +311,12 @@ def in_form(template: Template, letters: Container[str], form: str) -> dict[str,
 
 
 def plain_text(expression: Expression | None) -> str | None:
-    """The text that an argument is, if it is one."""
+    """The text of an argument that is a string; else None."""
     while isinstance(expression, Unary):
         expression = expression.operand
     return expression.value if isinstance(expression, StringLiteral) else None
 
 
 def is_statement(plan: SinumerikPlan) -> bool:
-    """Whether the block could not be understood."""
+    """Whether the block was not understood."""
     return STATEMENT in plan.opaque

@@ -1,13 +1,12 @@
-"""The control while it follows a program: frames, modes, tool, variables, and where the axes stand.
+"""The state of a SINUMERIK control that follows a program: frames, modes, tool, variables, axis positions.
 
-Positions, motions, what is known and what is asked of the setup are those of all controls. SINUMERIK has of its own a
-chain of frames, and a book of what is not known that is kept in the coordinates of the program, since in a turned frame
-one unknown coordinate would hide three axes.
+Positions, motions, knowledge and questions to the setup are those of all controls (`ProgramControl`). SINUMERIK adds a
+chain of frames. Unknown positions are kept in program coordinates, since in a rotated frame one unknown coordinate
+would make three axes unknown.
 
-Increments (G91, IC), after a frame or a tool length has changed: an axis stands, and its frame or the length of its
-tool changes. Whether the next increment takes that change along is for setting data, one for frames and one for tools;
-as a control is delivered it does. So such an increment is refused, until the axis is brought somewhere absolutely,
-unless the setup says that increments leave it out.
+Increments (G91, IC) after a change of frame or tool length: setting data, one for frames and one for tools, tell
+whether the increment includes that change; by default it does. Such an increment is refused until the axis has moved to
+an absolute position, unless the setup states that increments exclude the change.
 Source: Siemens, "SINUMERIK 840D sl, axes, coordinate systems, frames (K2)": frames with G91, SD42440, SD42442.
 """
 
@@ -45,7 +44,7 @@ GEOMETRY = (X, Y, Z)
 ROUND = frozenset({20, 30, MOTIONS["cip"], MOTIONS["ct"]})
 
 RESET_OF_DIAMETER = "$MC_GCODE_RESET_VALUES[28]"
-"""Machine data: which of `DIAMETERS` is in force at the start."""
+"""Machine data with the key of `DIAMETERS` that is in force at the start."""
 
 DIAMETERS: Mapping[Value, str] = {1.0: "diamof", 2.0: "diamon", 3.0: "diam90"}
 
@@ -59,38 +58,37 @@ UNSTEADY = (
 TURNED_AWAY = "a rotary axis turns in a swivelled plane, which does not turn with it: CYCLE800 has to be called anew"
 
 TAKEN_ALONG = ("by machine coordinates",)
-"""What an axis of a turned frame counts from that an axis of the machine has moved: neither frames nor none."""
+"""Reference of an axis in a rotated frame after a motion of a machine axis: different from every frame."""
 
 Footing = tuple[tuple[object, ...], tuple[object, ...]]
-"""What the numbers of an axis count from: by its frame, and by the tool."""
+"""The reference of an axis's program position: (of its frame, of the tool)."""
 
 IN_PLANE = frozenset({"orivect", "oriplane"})
 
 NO_SYSTEM = "G500"
-"""The name under which the setup may give what is in force while no settable frame is."""
+"""The name under which the setup may give the offset that is in force without a settable frame."""
 
 
 class Sinumerik(ProgramControl):
-    """Everything that the steps of a block read and change.
+    """The state that the steps of a block read and change.
 
     over        rotary axes that the last motion took past a full turn
-    edge        cutting edge in force (D), 0 for none
-    allowance   what contours are offset by besides the radius of the tool (OFFN), mm; NaN where that is not known
-    at_start    the tool is still that with which the program began, with its edge D1
-    whole       the motion must not be split
-    cornered    the last motion ended at a corner that the control rounds or breaks
-    acting      a synchronized action without ID has come since the last motion: it acts in the block of the next
-    pattern     the places to which the last pattern of holes has led
-    contours    those that CYCLE62 has named for the next cycle; `milled`: one has used them
-    contour     the blocks that are executed are those of a contour, which a cycle mills
-    solitary    blocks after which no line may be put, since REPEAT would leave it out
+    edge        active cutting edge (D), 0 for none
+    allowance   offset of contours in addition to the tool radius (OFFN), mm; NaN if unknown
+    at_start    the tool is still the one at the program start, with its edge D1
+    whole       the current motion must not be split
+    cornered    the last motion ended at a corner that the control rounds or chamfers
+    acting      a synchronized action without ID came since the last motion, and acts in the next motion block
+    pattern     places of the last pattern of holes
+    contours    contours that CYCLE62 has named for the next cycle; milled: a cycle has used them
+    contour     the current blocks are a contour that a cycle mills
+    solitary    blocks after which no line may be inserted, since REPEAT would skip it
     fresh_tool  a tool has been called since the last motion
-    changed_by_cycle  a name that is not known has followed a call of a tool at once, or a number (L6) one at any time:
-                it may be what changes the tool
-    counted     for each letter what its numbers counted from when the axis was last brought somewhere
-    footing     the same of the frames that are in force now
-    stated      the motion code is what the program itself has said, not what something that is not followed may leave
-    heading     in which direction of the program's frame the last motion ended (X Y Z); None where that is not known
+    changed_by_cycle  an unknown name directly after a tool call, or an unknown number (L6), may change the tool
+    counted     for each letter, the reference of its position when the axis last moved
+    footing     for each letter, the reference now in force
+    stated      the motion code was set by the program, not possibly by a cycle that is not followed
+    heading     direction (X Y Z) of the end of the last motion in the program's frame; None if unknown
     """
 
     frame_order = ("datum", "plane", "programmable")
@@ -123,7 +121,7 @@ class Sinumerik(ProgramControl):
             self.count_in(at_start)
 
     def count_in(self, name: str) -> None:
-        """DIAMON, DIAM90 or DIAMOF, in lower case: X counts in diameters or not."""
+        """Execute DIAMON, DIAM90 or DIAMOF, in lower case: whether X is a diameter."""
         self.modes.diameter = "" if name == "diamof" else name.upper()
         self.modes.said, self.modal.diameter = True, name != "diamof"
         self.resume("diameter")
@@ -132,7 +130,7 @@ class Sinumerik(ProgramControl):
     # -- frames -------------------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """As of every control, with what the numbers of the program count from."""
+        """As of every control; also updates `footing`."""
         super().refresh()
         self.footing = self._footings(self.composed)
 
@@ -150,13 +148,13 @@ class Sinumerik(ProgramControl):
         return self.modes.transformed and self.modes.orientation in IN_PLANE
 
     def spatial_anchor(self, index: int) -> Hashable:
-        """Whether these are coordinates of the tip, and the edge that is in force across the plane."""
+        """The tip control and tool edge on which an axis's positions depend; None for rotary and other axes."""
         if index not in GEOMETRY:
             return None
         return self.tcp, (self.tools.offset, self.edge) if self.tcp or index == Z else None
 
     def select(self, name: str) -> None:
-        """A settable frame comes into force."""
+        """Take a settable frame into force."""
         given = self.setup.work_offsets.get(name, {})
         stored = {INDEX[letter]: value * self.of_setup(letter) for letter, value in given.items()}
         self.frames = replace(self.frames, name=name, datum=shifted(stored))
@@ -164,11 +162,11 @@ class Sinumerik(ProgramControl):
         self.refresh()
 
     def of_setup(self, letter: str) -> float:
-        """mm or rad per unit of the setup."""
+        """mm or rad per unit of an axis in the setup (mm or degree)."""
         return DEGREE if self.rotary[INDEX[letter]] else 1.0
 
     def check_offset(self) -> None:
-        """The settable frame is used: it is given, or lacking."""
+        """At the first use of the settable frame, ask the setup for it."""
         if self.offset_checked:
             return
         self.offset_checked = True
@@ -176,7 +174,7 @@ class Sinumerik(ProgramControl):
             self.knowledge.work_offset(self.frames.name)
 
     def restore(self, modal: Modal, modes: Modes, frames: FrameStack) -> None:
-        """Bring back what was in force before a subprogram that says SAVE."""
+        """Restore the state before a subprogram with SAVE, except motion code, feed and transformations."""
         motion, straight, feed = self.modal.motion, self.modal.straight, self.modal.feed
         if frames.plane != self.frames.plane:
             self.suspend("tilt", "a swivelled plane (CYCLE800) of a subprogram with SAVE, which may stay in force")
@@ -190,7 +188,7 @@ class Sinumerik(ProgramControl):
     # -- tool-centre-point control ------------------------------------------------------------------------------------
 
     def switch_tcp(self, tool: Vector | None = None) -> None:
-        """Take TRAORI, a swivelled plane or another tool into force: the machine stands still, its tip may not."""
+        """Update tip control after a change of TRAORI, swivelled plane or tool; the machine axes do not move."""
         on = self.setup.tcp or self.modes.transformed or self.modes.swivelled
         new = self.tools.vector if tool is None else tool
         if on or self.tcp:
@@ -202,15 +200,12 @@ class Sinumerik(ProgramControl):
     # -- what is known ------------------------------------------------------------------------------------------------
 
     def lose_all(self, reason: str) -> None:
-        """No axis stands where it is known to from here on; `reason` has a `{}` for the axis letter.
-
-        Nor is the motion code known to be what it was.
-        """
+        """Mark the positions of all axes, and the motion code, as unknown; `reason` has a `{}` for the axis letter."""
         self.stated = False
         self.lose(self.axis_indices, reason)
 
     def path_word(self, words: Collection[str]) -> str:
-        """See `PATH_WORDS`; I J K are words of arcs, and lead nowhere beside a straight motion."""
+        """A word of the block that moves an axis, "" if none; I J K count only with an arc code in force."""
         leading = min(PATH_WORDS.intersection(words), default="")
         if not leading and self.modal.motion in ROUND:
             leading = min({*CENTRE_LETTERS}.intersection(words), default="")
@@ -222,13 +217,13 @@ class Sinumerik(ProgramControl):
         self.lose_all(AFTER_THAT.format(reason))
 
     def use_all_start_positions(self) -> None:
-        """All start positions matter: they are given, or lacking and taken as zero."""
+        """Ask the setup for all start positions still unknown; missing ones are taken as zero."""
         self.use_start_positions(tuple(self.unknown))
 
     # -- increments ---------------------------------------------------------------------------------------------------
 
     def _footings(self, whole: Affine) -> list[Footing]:
-        """The footing of every letter while these frames are in force."""
+        """The reference of every letter with these frames in force."""
         tool = self.tools.vector
         return [
             (frame_of(whole, index), (self.tcp, tuple(tool[:3])) if self.tcp and index < 3 else (tool[index],))
@@ -236,7 +231,7 @@ class Sinumerik(ProgramControl):
         ]
 
     def unsteady(self, index: int, *, by_machine: bool = False) -> str:
-        """Why nobody can say where an increment of an axis leads; empty if all is well."""
+        """Why the end of an increment of an axis is uncertain; "" if it is not."""
         before, now = self.counted[index], (self._footings(WORLD) if by_machine else self.footing)[index]
         if before == now:
             return ""
@@ -247,9 +242,10 @@ class Sinumerik(ProgramControl):
         return ""
 
     def count_from_here(self, axes: int, *, by_machine: bool = False) -> None:
-        """These axes, a bit mask, have been brought somewhere: in the frames in force, or in machine coordinates.
+        """Set the reference of increments of these axes (bit mask), which have moved to a position.
 
-        An axis of the machine takes X, Y and Z of a turned frame along, and the frame was off meanwhile.
+        by_machine  they moved in machine coordinates. With a rotated frame this also moves the other geometry axes of
+                    the program, whose reference becomes `TAKEN_ALONG`
         """
         footing = self._footings(WORLD) if by_machine else self.footing
         moved = [index for index in GEOMETRY if by_machine and self.is_rotated and axes >> index & 1]
@@ -262,7 +258,7 @@ class Sinumerik(ProgramControl):
     # -- motions ------------------------------------------------------------------------------------------------------
 
     def here(self, lost: UnknownAxes | None = None) -> MotionEnd:
-        """Where the axes stand; `lost`: what is not known along the axes of the program's frame, if not what is now."""
+        """The current position as the end of a motion; lost: unknown axes of the program's frame, by default as now."""
         if lost is None:
             return MotionEnd(self.position[:], dict(self.unknown), dict(self.lost_in_frame()))
         return MotionEnd(self.position[:], self.axes_of(lost), lost)
@@ -280,11 +276,11 @@ class Sinumerik(ProgramControl):
         placed: int | None = None,
         by_machine: bool = False,
     ) -> None:
-        """Make a motion of a block, and keep where it leads in coordinates of the program.
+        """Add a motion of a block, and update the position.
 
-        code        the motion code, in tenths
+        code        motion code, in tenths
         refusal, passing, arc  as in `Motion`
-        placed      as there; None: the axes of its words, but for increments, and none where the motion is passed
+        placed      as in `Motion`; None: the axes of the words without increments, none if the motion is passed
         by_machine  the words are machine coordinates
         """
         polar = self.modal.plane.axes if words.values.keys() & {"AP", "RP"} else 0  # these name both axes of the plane
@@ -310,18 +306,18 @@ class Sinumerik(ProgramControl):
             self.suspend("tilt", TURNED_AWAY)
 
     def _leaves_plane(self, end: MotionEnd) -> bool:
-        """Whether a rotary axis turns in a swivelled plane: without TRAORI the plane stays where it was."""
+        """Whether the motion turns a rotary axis in a swivelled plane that does not follow it (no TRAORI)."""
         target, here = end.target, self.position
         moved = (target[i] != here[i] or (i in self.unknown and i not in end.unknown) for i in self.turning)
         return self.held and any(moved)
 
     @property
     def held(self) -> bool:
-        """Whether the plane is swivelled (CYCLE800), and the control does not lead the tip."""
+        """Whether the plane is swivelled (CYCLE800) without tool-centre-point control."""
         return self.modes.swivelled and not (self.modes.transformed or self.setup.tcp)
 
     def _heading(self, end: MotionEnd, arc: Arc | None) -> Sequence[float] | None:
-        """The direction in which a motion is about to end; None where it is not known."""
+        """The direction of the end of a motion in the program's frame; None if unknown."""
         step = [b - a for a, b in zip(self.position, end.target, strict=True)]
         if any(index in self.unknown or index in end.unknown for index in GEOMETRY):
             return None
@@ -332,7 +328,7 @@ class Sinumerik(ProgramControl):
         return None if any(step) else self.heading
 
     def head_as_latest(self) -> None:
-        """Keep the direction in which the last of many motions of the fast lane ended, as that of single ones."""
+        """Set `heading` after motions of the fast lane, as after single motions."""
         stretch = self.builder.latest
         if stretch is None:
             return
@@ -345,11 +341,11 @@ class Sinumerik(ProgramControl):
             self.heading = steps[last, :3].tolist() if steps[last, :3].any() else None
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
-        """As for all controls; whether it is a rapid, the program has to have said."""
+        """As of every control, but only if the program itself has set the motion code."""
         return self.stated and super()._leaves_unknown(rapid)
 
     def counted_words(self, words: BlockWordValues) -> list[int]:
-        """The axes whose words count from where they stand."""
+        """The axes whose words are increments."""
         named = ((index, words.forms.get(letter, "")) for letter, index in INDEX.items() if letter in words.values)
         return [index for index, form in named if self.counts_on(form)]
 
@@ -371,20 +367,20 @@ class Sinumerik(ProgramControl):
         )
 
     def _passes_zero(self, words: BlockWordValues, target: Vector) -> bool:
-        """Whether DC, ACP, ACN or IC leads an axis past a full turn: then pieces of the way would count otherwise."""
+        """Whether DC, ACP, ACN or IC leads an axis past a full turn, so that the motion must not be split."""
         turn, endless = 2 * math.pi, self.builder.endless
         steps = [] if self.modal.incremental else [index for index in self.counted_words(words) if endless >> index & 1]
         places = ((self.position[index], target[index]) for index in (*self.over, *steps))
         return any(not 0 <= place < turn for pair in places for place in pair)
 
     def goes_to_number(self, index: int, angle: float) -> bool:
-        """Whether the shortest way to an angle, degrees, leads to the number itself, within the same turn."""
+        """Whether the shortest way to an angle, degree, stays within the same turn, so that DC leads to the number."""
         here, step = self.position[index], self.scale[index] * angle
         counts = self.rotary[index] and not self.modal.incremental and self.offset[index] == 0.0
         return counts and 0.0 <= here < 2 * math.pi and abs(step - here) < math.radians(HALF_A_TURN)
 
     def wrap(self) -> None:
-        """A rotary axis that went past a full turn with DC, ACP or ACN counts from 0 to 360 degrees again."""
+        """Reduce the position of rotary axes that DC, ACP or ACN took past a full turn to 0 ... 360 degree."""
         if self.over:
             self.position = [
                 value % (2 * math.pi) if index in self.over else value for index, value in enumerate(self.position)
@@ -394,7 +390,7 @@ class Sinumerik(ProgramControl):
     # -- tools --------------------------------------------------------------------------------------------------------
 
     def length_of(self, number: int, edge: int) -> float:
-        """The length of a tool for its cutting edge, mm; zero if it is lacking."""
+        """The length of a tool for its cutting edge, mm; if the setup lacks it, it is noted and zero."""
         if number == 0:
             return 0.0
         name = self.named.name(number) if edge == 1 else f"{self.named.name(number)} D{edge}"
@@ -405,7 +401,7 @@ class Sinumerik(ProgramControl):
         return known
 
     def ask_for_length(self) -> None:
-        """A tool called by name that moves without its length offset: the machine's errors may depend on its length."""
+        """Ask for the length of a tool called by name that moves without length offset: errors may depend on it."""
         number = self.tools.spindle
         if self.tools.offset is None and self.named.name(number) != str(number) and self.given_length(number) is None:
             self.length_of(number, 1)
@@ -416,12 +412,12 @@ class Sinumerik(ProgramControl):
         return None if tool is None else tool.length
 
     def tool_radius(self) -> float:
-        """As of every control; of the cutting edge in force, and with the allowance of the contour (OFFN)."""
+        """As of every control: the radius of the active cutting edge plus the allowance (OFFN), mm."""
         tool = self._given(self.tools.spindle, self.edge)
         return math.nan if tool is None or tool.radius is None else tool.radius + self.allowance
 
     def _given(self, number: int, edge: int) -> Tool | None:
-        """A tool with one of its edges, if the setup has it."""
+        """A tool with one of its edges, if the setup has it; else None."""
         name = self.named.name(number)
         return self.setup.tool_called(name if edge == 1 else f"{name} D{edge}")
 
@@ -434,12 +430,12 @@ class Sinumerik(ProgramControl):
         return math.nan if known is None else known
 
     def length_under_tcp_with(self, tool: Vector, number: int | None) -> float:
-        """With D0 a transformation leads the point where a tool of no length has its tip."""
+        """As of every control; with D0 the transformation leads the tip of a tool of no length."""
         return tool[2]
 
 
 def frame_of(whole: Affine, index: int) -> tuple[object, ...]:
-    """What an axis counts from by frames; in a turned frame each of X Y Z counts from all three."""
+    """The reference of an axis in a frame; in a rotated frame X, Y and Z each depend on all three shifts."""
     if index >= 3:
         return (whole.shift[index],)
     turned = whole.rotation != WORLD.rotation
@@ -447,7 +443,7 @@ def frame_of(whole: Affine, index: int) -> tuple[object, ...]:
 
 
 def departing(arc: Arc, end: Vector, step: Vector) -> Vector:
-    """The direction in which an arc or helix that makes `step` ends, in commands; of any length."""
+    """The direction of the end of an arc or helix with displacement `step`, in machine axes; not normalized."""
     nx, ny, nz = arc.normal
     x, y, z = (end[i] - arc.centre[i] for i in range(3))
     rise = nx * step[0] + ny * step[1] + nz * step[2]

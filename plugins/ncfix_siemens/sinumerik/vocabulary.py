@@ -1,8 +1,6 @@
-"""The words of SINUMERIK that are names, and what each of them is to whoever follows a program.
+"""The vocabulary of SINUMERIK: names by their meaning for the interpreter; word values of a block; modal states.
 
-Source: Siemens, "SINUMERIK 840D sl, NC programming": tables of statements. All names are lower case here.
-
-Then, as values that know no control: what a block says, and what stays in force.
+Source: Siemens, "SINUMERIK 840D sl, NC programming": tables of statements. All names are in lower case.
 """
 
 from __future__ import annotations
@@ -20,7 +18,7 @@ _SETTERS = """
     ovr ovrra fl fb fz fprda spos sposa meas meaw meawa measa po pl pw sd prio rpl lims disrp dism
 """
 SETTERS = frozenset(_SETTERS.split())
-"""Names that take a value as an address does: `CR=5`. They are words, other names that get a value are variables."""
+"""Names that are addresses, `CR=5`; other names with a value are variables."""
 
 POLAR = frozenset({"AP", "RP"})
 """Polar coordinates: angle and radius about the pole."""
@@ -31,32 +29,32 @@ POLES = frozenset({1100, 1110, 1120})
 VECTOR = ("A3", "B3", "C3")
 ANGLES = ("A2", "B2", "C2")
 NORMALS = frozenset(["A4", "B4", "C4", "A5", "B5", "C5"])
-"""Normals of the surface: with them the control offsets the contour, and leads the tool along it with ORIPATH."""
+"""Surface normals, by which the control offsets the contour (CUT3D) and leads the tool (ORIPATH)."""
 
 ALONG_TOOL = "MOVT"
-"""How far the tool goes along itself."""
+"""Motion along the tool direction."""
 
 OTHERS = frozenset(["A6", "B6", "C6", "A7", "B7", "C7", "LEAD", "TILT", "THETA", "PSI", "PHI", "NUT"])
-"""Other ways to say how the tool stands, which are not followed."""
+"""Other words for the orientation of the tool, which are not followed."""
 
 _ARCS = frozenset({"CR", "AR", "TURN", "I1", "J1", "K1"})
 PATH_WORDS = POLAR | NORMALS | OTHERS | _ARCS | {*INDEX, *VECTOR, *ANGLES, ALONG_TOOL, "ANG"}
-"""The words that lead somewhere, whatever motion is in force."""
+"""The words that cause a motion with any motion code."""
 
 ABSOLUTE, INCREMENTAL, SHORTEST_WAY = "ac", "ic", "dc"
 TURNING = frozenset({SHORTEST_WAY, "acp", "acn"})
 FORMS = TURNING | {ABSOLUTE, INCREMENTAL}
-"""How one word is meant, `X=IC(10)`: absolutely, incrementally, or to an angle on the shortest way or in a sense."""
+"""Forms of a word, `X=IC(10)`: absolute, incremental, or an angle by the shortest way or in a given sense."""
 HALF_A_TURN = 180.0 - 1e-6
-"""Degrees; so far and farther which way is the shorter is not for rounded numbers to say."""
+"""Angle, degree, from which rounding decides which way is the shorter one."""
 FORM = re.compile(r"\s*(?P<form>[A-Z]+)\s*\(\s*(?P<value>.*?)\s*\)\s*\Z", re.IGNORECASE | re.DOTALL)
 
 MOTIONS = {"cip": 1000, "ct": 1010, "poly": 1020, "aspline": 1030, "bspline": 1040, "cspline": 1050}
 MOTIONS |= dict.fromkeys(("invcw", "invccw"), 1060) | dict.fromkeys(("oemipo1", "oemipo2"), 1070)
-"""Names that belong to the group of G0 to G3; the numbers are ours, for the column `modal`."""
+"""Names of the group of G0 to G3 -> internal motion code, for the column `modal`."""
 
 CT_LEFT, CT_RIGHT = MOTIONS["ct"], MOTIONS["ct"] + 1
-"""Of the column `modal`: an arc of CT that turns counter-clockwise, and clockwise."""
+"""Internal motion codes of an arc by CT, counter-clockwise and clockwise."""
 
 UNFOLLOWED_MOTIONS = {
     1020: "polynomials (POLY)",
@@ -99,7 +97,7 @@ _HARMLESS = """
     qeclrnof rdisable sirelin sirelout splinepath stopreof comppath dyn3d cycle62 waitenc ipoenda
 """
 HARMLESS = frozenset(_HARMLESS.split())
-"""Names that move no geometry axis and change no coordinates: passed over."""
+"""Names that move no geometry axis and change no coordinates; ignored."""
 
 UNFOLLOWED = {
     "transmit": "face transformation (TRANSMIT)",
@@ -154,7 +152,7 @@ UNFOLLOWED = {
     **dict.fromkeys(("diamona", "diamofa", "diam90a", "diamchan", "diamchana"), "diameters axis by axis (DIAMONA)"),
     **dict.fromkeys(("diamcycof", "diacycofa"), "radii of a cycle (DIAMCYCOF)"),
 }
-"""Names after which coordinates are no longer those that are followed."""
+"""Names that change coordinates in a way that is not followed -> description; motions after them are refused."""
 
 ENDED_BY = {
     "trafoof": frozenset({"traori", "transmit", "tracyl", "traang", "tracon", "trafoon"}),
@@ -170,7 +168,7 @@ ENDED_BY = {
     "tangof": frozenset({"tangon"}),
     "egofs": frozenset({"egon", "egonsyn", "egonsyne"}),
 }
-"""Names that end some of them; the others stay to the end of the program."""
+"""Name -> names of `UNFOLLOWED` that it ends; others stay in force to the end of the program."""
 
 ASYNCHRONOUS = {
     "posa": "a positioning axis that the program does not wait for (POSA)",
@@ -180,50 +178,50 @@ ASYNCHRONOUS = {
     "mov": "an axis that is started (MOV)",
     "oscill": "an axis that oscillates (OSCILL)",
 }
-"""Names that with an axis as index, `OS[Z]=1`, let it move by itself."""
+"""Names that, with an axis as index, `OS[Z]=1`, move it by itself -> description."""
 
 UNSEEN = {"fxs": "travel to a fixed stop (FXS)", "g": "a G code that is named by its group (G[..])"}
-"""Names that with an index change what motions after them do, in a way that is not followed."""
+"""Names that, with an index, change later motions in a way that is not followed -> description."""
 
 OF_THE_CONTROL = re.compile(
     r"\$(?:p_\w*fr|tc_(?:dp|[se]cp|adpt|carr)|m[nca]_|aa_(?:off|etrans)|ac_trans|sn_cec_)|toff|tcarr$|cutmodk?$|mtl$"
     r"|\$sc_(?:mirror_tool|wear_|tool_length_(?:type|const_t$)|tool_temp|tocarr|toframe)"
 )
-"""Names, lower case, with which frames, tool lengths or the machine itself change when they get a value."""
+"""Names, lower case, whose assignment changes frames, tool lengths or machine data."""
 
 TURNS_OF_THE_TOOL = frozenset({"orivect", "oriaxes", "oriplane", "oripath", "oripaths", "oricurve"})
 TURNS_OF_THE_TOOL |= {"oriconcw", "oriconccw", "oriconio", "oriconto"}
-"""How the tool turns between two blocks: the names of one group of G codes."""
+"""The G code names for the interpolation of the tool orientation."""
 
 STROKES = "strokes"
 PUNCHING = {**dict.fromkeys(("pon", "pons", "son", "sons"), frozenset({STROKES})), "spof": frozenset[str]()}
-"""Names from which on every block ends with a stroke of the punch, and the one that ends that."""
+"""Names that switch punching on or off -> the new state; with it every block ends with a stroke."""
 
 PROBING = frozenset({"measa", "meawa", "meac"})
-"""Names that with an axis as index let the motion of the block measure."""
+"""Names that, with an axis as index, make the motion of the block measure."""
 
 DRILLING = frozenset({*(f"cycle{number}" for number in range(81, 90)), "cycle840"})
 """Cycles whose first arguments are RTP, RFP, SDIS, DP, DPR and that drill where the axes stand."""
 
 MADE_BY_THE_CONTROL = re.compile(r"(?:cycle|holes|pocket|slot)\d+|longhole")
-"""Cycles whose motions the control makes up, unless a subprogram of that name is at hand."""
+"""Cycles of the control, whose motions it generates, unless a subprogram of that name is at hand."""
 
 MEASURING = re.compile(r"cycle(?:961|97[1346789]|982|99[4-8]|9960)")
-"""Of them, those that measure."""
+"""Measuring cycles."""
 
 CALIBRATING = frozenset({"cycle971", "cycle973", "cycle976", "cycle982"})
-"""Of these, those that measure the probe or a tool: they set no frame."""
+"""Measuring cycles for the probe or a tool, which set no frame."""
 
 RESULTS = {"read": 4, "getselt": 0}
-"""Names that change nothing but variables: those that are arguments, from that place on. Errors do not occur."""
+"""Names that only change variables -> index of the first argument that they change."""
 
 DEEP, FIRST_DEPTH = "cycle83", (5, 6)
-"""The cycle that drills in steps, and where the depth of the first one stands: a height (FDEP), a way down (FDPR)."""
+"""Deep-hole drilling, and the indices of its first depth: as a height (FDEP), or incremental (FDPR)."""
 
 RTP, RFP, SDIS, DP, DPR = range(5)
 
 
-# -- what a block says -------------------------------------------------------------------------------------------------
+# -- word values of a block --------------------------------------------------------------------------------------------
 
 
 @mutable
@@ -231,11 +229,11 @@ class BlockWordValues:
     """The words of a block while it is executed.
 
     block    the block in its program
-    values   address -> number, in program units; None where it is known only at run time
-    forms    address -> how the word is meant (`ac`, `ic`, `dc`, ...), where it says so
+    values   address -> number, in program units; None if known only at run time
+    forms    address -> form of the word (`ac`, `ic`, `dc`, ...), if it has one
     axes     bit mask of the axis words
     texts    address -> text, as in T="DRILL"
-    refusal  why a motion of the block is refused, if it is
+    refusal  why the motion of the block is refused; "" if it is not
     whole    the motion must not be split
     """
 
@@ -248,36 +246,36 @@ class BlockWordValues:
     whole: bool = False
 
     def refuse(self, reason: str, rotary: Sequence[int]) -> None:
-        """Refuse the motion of the block; where these rotary axes go is not known."""
+        """Refuse the motion of the block, with an unknown end of these rotary axes."""
         self.refusal = reason
         for index in rotary:
             self.values[LETTERS[index]] = None
             self.forms[LETTERS[index]] = ABSOLUTE
 
     def get(self, address: str, default: float = 0.0) -> float:
-        """The number of a word; the default where it is not there, or not known."""
+        """The number of a word; the default if it is absent or unknown."""
         value = self.values.get(address)
         return default if value is None else value
 
     def unknown(self, *addresses: str) -> bool:
-        """Whether one of these words is there and known only at run time."""
+        """Whether one of these words is present but known only at run time."""
         return any(address in self.values and self.values[address] is None for address in addresses)
 
 
 @frozen
 class Drilling:
-    """A drilling or milling cycle as it was called.
+    """The call of a drilling or milling cycle.
 
     name    lower case
-    clear   height at which it ends, in program units (RTP); None if known only at run time
-    depth   of the hole, in program units
-    fault   why its holes are refused; empty if they are not
-    values  of its arguments
-    sure    all arguments that are written are known
-    external  the file in which it is called; empty: the program itself
+    clear   height of retraction (RTP), in program units; None if known only at run time
+    depth   height of the bottom, in program units; None if unknown
+    fault   why its holes are refused; "" if they are not
+    values  values of its arguments
+    sure    whether all written arguments are known
+    external  the file in which it is called; "": the program itself
     depths  see `CycleCall`
-    place   of a milling cycle: where it works, in program units; None: where the axes stand
-    points  (place, axis): its arguments that say so; 0 and 1 are the axes of the plane
+    place   position of a milling cycle in program units; None: where the axes stand
+    points  arguments of that position: (index, axis of the plane, 0 or 1)
     """
 
     name: str
@@ -294,25 +292,24 @@ class Drilling:
 
 @mutable
 class Modes:
-    """What is in force besides the modal state that all controls have.
+    """Modal state of SINUMERIK, in addition to that of all controls.
 
-    added        what of the shift of the programmable frame is the additive part (ATRANS, G59), mm and rad; None where
-                 nobody can say
-    fine         G59 has set that part
+    added        additive part (ATRANS, G59) of the shift of the programmable frame, mm and rad; None if unknown
+    fine         whether G59 has set that part
     diameter     "", "DIAMON" or "DIAM90"
-    said         the program or the setup has said whether X is a diameter
-    pole         of polar coordinates in the frame of the program, mm; None until one is programmed
-    carried      TRAORI or TRAFOOF, if one came after the settable frame and no motion has come since
-    in_plane     the plane has not changed since the start: a pole that nobody has set is the zero point
-    polar        the last AP and RP
-    transformed  TRAORI is on
-    swivelled    CYCLE800 has tilted the plane
-    modal_cycle  what MCALL calls after each block with a motion
-    orientation  ORIAXES, ORIVECT or another way in which the tool turns, lower case
-    orientation_in_machine  ORIMKS
-    rounds       RNDM rounds all corners
-    angles       ORIEULER, ORIRPY or ORIRPY2, lower case: what A2 B2 C2 are
-    by_block     something acts at the end of every block, or by how far a block is: punching, synchronized actions
+    said         whether program or setup has stated if X is a diameter
+    pole         pole of polar coordinates in the program's frame, mm; None until one is set
+    carried      TRAORI or TRAFOOF, if it came after the settable frame and before any motion
+    in_plane     whether the plane is still the first one, so that an unset pole is the zero point
+    polar        the last AP, rad, and RP, mm
+    transformed  whether TRAORI is on
+    swivelled    whether CYCLE800 has tilted the plane
+    modal_cycle  the cycle that MCALL executes after each motion block
+    orientation  interpolation of the tool orientation, ORIAXES, ORIVECT, ..., lower case
+    orientation_in_machine  whether ORIMKS is in force
+    rounds       whether RNDM rounds all corners
+    angles       meaning of A2 B2 C2: ORIEULER, ORIRPY or ORIRPY2, lower case
+    by_block     effects that depend on the division into blocks: punching, synchronized actions
     """
 
     added: Sequence[float] | None = ZEROS
@@ -335,14 +332,14 @@ class Modes:
 
 @mutable
 class NamedTools:
-    """Tools that are called by name: numbers that stand for them here, beyond those that a magazine has."""
+    """Internal numbers of tools that are called by name, beyond those of a magazine."""
 
     numbers: dict[str, int] = field(default_factory=dict)
 
     def number(self, name: str) -> int:
-        """The number of a name."""
+        """The internal number of a tool name."""
         return self.numbers.setdefault(name, 1_000_000 + len(self.numbers))
 
     def name(self, number: int) -> str:
-        """How people call a tool."""
+        """The name of a tool by its number, or the number as text."""
         return next((name for name, known in self.numbers.items() if known == number), str(number))
