@@ -209,7 +209,7 @@ def is_ready(control: Sinumerik) -> bool:
 
 
 def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Sequence[Ways], stage: BlockRows) -> int:
-    """Set the rotary positions of a stage to the nearest solutions; the number of motions until a decision is needed."""
+    """Set the rotary positions of a stage to the nearest solutions; the number of motions until one is undecided."""
     first, second = letters
     (scale, other_scale), (offset, other_offset) = (
         [each[i] for i in letters] for each in (control.scale, control.offset)
