@@ -1,11 +1,13 @@
 """Whatever ends ncfix, nothing of it goes on: no process, no open pipe, no half of an output; `--resume` does the rest.
 
-`NCFIX_MOMENTS=25` kills each kind of run so many times, spread over all that it does; else once.
+`NCFIX_MOMENTS=25` kills each kind of run so many times, spread over all that it does; else once. `NCFIX_KILLS=40
+NCFIX_PROGRAMS=500` kills one batch of so many programs again and again.
 """
 
 from __future__ import annotations
 
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -20,6 +22,8 @@ from typing import NamedTuple
 import pytest
 
 MOMENTS = int(os.environ.get("NCFIX_MOMENTS", "1"))
+KILLS = int(os.environ.get("NCFIX_KILLS", "3"))
+PROGRAMS = int(os.environ.get("NCFIX_PROGRAMS", "12"))
 PATIENCE_S = 20.0
 """Far more than the others take to notice, on a computer that does much else."""
 MACHINE = """
@@ -43,7 +47,7 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "a batch": Kind(12, 300, {}),
+    "a batch": Kind(PROGRAMS, 300, {}),
     "one long program": Kind(1, 12000, {"NCFIX_PART_BYTES": "20000"}),
 }
 
@@ -79,7 +83,7 @@ def whole(title: str) -> tuple[dict[str, bytes], float]:
     """The outputs of a run that nobody stops, and how long it takes, s."""
     before, out = time.monotonic(), ground(title) / "whole"
     running = started(title, out, uuid.uuid4().hex)
-    said, _ = running.communicate(timeout=300)
+    said, _ = running.communicate(timeout=300 + PROGRAMS)
     assert running.returncode == 0, said.decode()
     return contents(out / "out"), time.monotonic() - before
 
@@ -127,7 +131,31 @@ def test_nothing_is_left(title: str, how: signal.Signals, moment: int) -> None:
         gone(mark, begun + PATIENCE_S)
     assert contents(out / "out").items() <= expected.items()
     again = started(title, out, mark, "--resume")
-    said, _ = again.communicate(timeout=300)
+    said, _ = again.communicate(timeout=300 + PROGRAMS)
     assert again.returncode == 0, said.decode()
     assert contents(out / "out") == expected
     gone(mark, time.monotonic() + PATIENCE_S)
+
+
+def test_a_batch_that_is_killed_again_and_again_becomes_what_it_would_have_been() -> None:
+    """Its parent is killed at random moments of the whole run, and each time `--resume` goes on with what is left."""
+    expected, lasts = whole("a batch")
+    rng, mark, early = random.Random(KILLS), uuid.uuid4().hex, 0
+    out = ground("a batch") / mark
+    for kill in range(KILLS):
+        running = started("a batch", out, mark, *(["--resume"] if kill else []))
+        time.sleep(rng.uniform(0.2, max(1.0, 2.0 * lasts / KILLS)))
+        early += running.poll() is None
+        running.kill()
+        begun = time.monotonic()
+        try:
+            running.communicate(timeout=PATIENCE_S)
+        finally:
+            gone(mark, begun + PATIENCE_S)
+        assert contents(out / "out").items() <= expected.items()
+    again = started("a batch", out, mark, "--resume")
+    said, _ = again.communicate(timeout=300 + PROGRAMS)
+    assert again.returncode == 0, said.decode()
+    assert contents(out / "out") == expected
+    assert early > 0
+    print(f"{PROGRAMS} programs, {KILLS} kills, {early} of them before the end, {lasts:.0f} s undisturbed")
