@@ -29,7 +29,7 @@ from ncfix.control.coordinates import (
     zeros,
 )
 from ncfix.control.expressions import Unknown, Value
-from ncfix.control.frames import WORLD, FrameStack, handed, mixed_into
+from ncfix.control.frames import FrameStack, handed, mixed_into
 from ncfix.control.moves import AT_START, Arc, FeedMode, UnknownAxes
 from ncfix.control.pointing import Pair
 from ncfix.control.posture import NEAREST, SQUARE, MachinePosture, Postures, WayRules, normal_of
@@ -196,7 +196,6 @@ class ControlState(ABC):
         self.posture = MachinePosture(run.kinematics, self.axis_indices, self.rotary)
         self.modal = Modal()
         self.frames = FrameStack(self.frame_order)
-        self.composed = WORLD
         self.tools = Tools()
         self.knowledge = SetupLookup(run.setup, self.place)
         self.messages: dict[str, Message] = {}
@@ -211,7 +210,7 @@ class ControlState(ABC):
         self._frame = -1
         given = () if run.setup.assume_zero else run.setup.initial
         self.places = Places(mask_of(INDEX[axis] for axis in run.axes if axis not in given))
-        self.rotation: Rotation = IDENTITY
+        self._compose()
         self.position = zeros()
         self.unknown: UnknownAxes = {}
         for axis in run.axes:
@@ -267,19 +266,23 @@ class ControlState(ABC):
 
     def refresh(self) -> None:
         """Compose the frames; must be called after a change of a frame, the tool, the unit or the diameter mode."""
+        before = self.rotation
+        self._compose()
+        if self.rotation != before:
+            self.frame_unknown = None
+        self._frame = -1
+        self.places.watch(self.anchors(), self.rotation)
+
+    def _compose(self) -> None:
         whole = self.composed = self.frames.whole
         self.offset: Vector = [a + b for a, b in zip(whole.shift, self.tool_shift, strict=True)]
-        if self.rotation != whole.rotation:
-            self.frame_unknown = None
-        self.rotation = whole.rotation
+        self.rotation: Rotation = whole.rotation
         self.is_rotated = self.rotation != IDENTITY
         self.inverse = transposed(self.rotation)
         self.stretch = self.modal.unit * whole.scale
         self.scale = [DEGREE if turning else self.stretch for turning in self.rotary]
         if self.modal.diameter:
             self.scale[0] /= 2
-        self._frame = -1
-        self.places.watch(self.anchors(), self.rotation)
 
     @property
     def tool_shift(self) -> Vector:
