@@ -1,4 +1,4 @@
-"""The second reader: where the axes stand, in which coordinates, and what is not known of either."""
+"""The second reader: the positions of the axes, the coordinates in force, and what is not known of both."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SQUARE = 2e-4
 CYCLES = re.compile("CYCLE|HOLES|POCKET|SLOT|LONGHOLE")
 """Cycles of SINUMERIK, which may be modal."""
 REWRITTEN = re.compile("G11[012]|G16|CT|CIP|RND|CHF|AP|RP")
-"""Other words that a correction may write another way, or the lines behind them."""
+"""Other words that a correction may rewrite in another form, or after which it may rewrite lines so."""
 
 
 @frozen
@@ -49,10 +49,10 @@ class Given:
 
 
 class Loss(NamedTuple):
-    """What a program uses, behind which it is not followed, as the reason that is given.
+    """The reason why a program is not followed any further.
 
-    rewritten  a correction may write further lines another way
-    modal      MCALL alone ends it
+    rewritten  a correction may rewrite further lines in another form
+    modal      MCALL alone ends the reason
     """
 
     why: str
@@ -61,7 +61,7 @@ class Loss(NamedTuple):
 
 
 class FollowedAxes:
-    """Axes that a program leads, and what it has put in force for their numbers."""
+    """The positions of the axes, and all that a program has put in force for the meaning of their numbers."""
 
     def __init__(self, axes: Sequence[str], family: Family, given: Given, model: TipModel | None) -> None:
         self.axes, self.family, self.given, self.model = tuple(axes), family, given, model
@@ -85,10 +85,10 @@ class FollowedAxes:
         self.local: dict[str, float] = {}
         """Shifts of axes by G52, mm or degree."""
         self.lost: dict[Loss, None] = {}
-        """In order; the first says why the program is not followed."""
+        """The losses in their order; the first is the reason why the program is not followed."""
 
     def lose(self, why: str, *, rewritten: bool = False, modal: bool = False) -> None:
-        """Follow no further, as `Loss` says."""
+        """Follow no further, for a reason; see `Loss`."""
         self.lost.setdefault(Loss(why, rewritten, modal))
 
     def lose_by(self, name: str) -> None:
@@ -98,7 +98,7 @@ class FollowedAxes:
 
     @property
     def is_rewritten(self) -> bool:
-        """Whether a correction may write lines from here on another way."""
+        """Whether a correction may rewrite lines from here on in another form."""
         return any(loss.rewritten for loss in self.lost)
 
     def forget(self) -> None:

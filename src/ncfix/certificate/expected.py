@@ -58,7 +58,10 @@ class Expected:
         tolerance_um: float = 1.0,
         turn: int | None = None,
     ) -> None:
-        """Follow both programs; `turn` is that of `AxisFollower.run`, of programs that have the same loops."""
+        """Follow both programs.
+
+        turn  see `AxisFollower.run`, for programs with the same loops; without effect if errors depend on direction
+        """
         self.first, self.second, self.given = first, second, given
         x, y, z = (a + b for a, b in zip(machine.workpiece_offset, given.workpiece_offset, strict=True))
         placed = ((x, y, z), dict(given.inputs))

@@ -1,7 +1,7 @@
-"""The second reader: in which order the lines of a program are executed, where counts and conditions are plain.
+"""The second reader: the order in which the lines of a program are executed, if counts and conditions are plain.
 
-Loops, jumps back and forth, sections that are repeated, and subprograms in the same text. Whatever else decides where a
-program goes on is not followed.
+It follows loops, jumps forwards and backwards, repeated sections, and subprograms in the same text. A program whose
+flow depends on anything else is not followed.
 """
 
 from __future__ import annotations
@@ -16,31 +16,32 @@ from ncfix.certificate.reading import JUMPS, Family
 from ncfix.certificate.text import Text
 
 MOST_LINES = 20_000
-"""That are executed; a program which goes on longer is not followed."""
+"""Largest number of executed lines; a longer program is not followed."""
 SAME = 1e-6
-"""What is compared is not as near as this, or the same: controls round."""
+"""Least difference of compared numbers that are not equal; below it, rounding in the control may decide."""
 
 
 class Lead(Enum):
-    """What a line does to where the program goes on."""
+    """The ways in which a line directs the flow of a program."""
 
     JUMP = 0
-    """To a line, if a condition holds."""
+    """Go on at a line, perhaps only if a condition holds."""
     REPEAT = 1
-    """The lines from one up to another, so many times more."""
+    """Execute lines a number of times more, then go on behind this line."""
     LOOP = 2
-    """The same behind this line, so many times in all."""
+    """Execute the lines that begin behind this one a number of times in all, then go on behind their end."""
     CALL = 3
     RETURN = 4
 
 
 class LeadingLine(NamedTuple):
-    """What one line does to where the program goes on.
+    """The effect of one line on the flow of the program.
 
-    to, stop  lines, by their indices; of what is repeated or called the first, and the one behind the last
-    times     how often a section is repeated or called, as a formula
-    when      the condition of a jump; empty: it is always made
-    holds     it is made if that holds, or else if it does not
+    to     index of the line to which a jump leads, or of the first line of what is repeated or called
+    stop   index of the line behind the last one of what is repeated; -1 for a call, which M99 or LBL 0 ends
+    times  number of repeats or calls, as a formula
+    when   condition of a jump; empty: the jump is always made
+    holds  True: the jump is made if the condition holds; False: if it does not hold
     """
 
     kind: Lead
@@ -52,11 +53,15 @@ class LeadingLine(NamedTuple):
 
 
 class NotPlainError(Exception):
-    """Where a program goes on is not plain."""
+    """Raised if the flow of a program cannot be followed: a count or condition is not plain, or it runs too long."""
 
 
 class OpenSection(NamedTuple):
-    """Lines that are executed so many times more before the program goes on at `back`; a call ends at no line (-1)."""
+    """A section in execution: lines `start` to `stop` (-1: a call, without a last line).
+
+    left  number of executions after the present one
+    back  line at which the program goes on after all of them
+    """
 
     start: int
     stop: int
@@ -65,17 +70,17 @@ class OpenSection(NamedTuple):
 
 
 class LineOrder:
-    """Where a program goes on, while it is followed."""
+    """Finds the next line to execute while a program is followed."""
 
     def __init__(self, lines: Mapping[int, LeadingLine]) -> None:
-        """Of these lines; all others lead to the next one."""
+        """`lines`: the lines that direct the flow, by their index; each other line leads to the next one."""
         self.lines = lines
         self._open: list[OpenSection] = []
         self._executed = 0
 
     @classmethod
     def of(cls, text: Text) -> LineOrder | None:
-        """That of a program; None if it has none, or one that is not plain."""
+        """The order of a program; None if no line directs the flow, or if a line that does is not plain."""
         odd = {row for row, line in text.apart() if line.odd is JUMPS}
         if not odd and not (text.family is Family.WORDS and SUBPROGRAM.search(text.source)):
             return None
@@ -88,7 +93,7 @@ class LineOrder:
 
     @classmethod
     def are_alike(cls, first: Text, second: Text) -> bool:
-        """Whether two programs have such lines, and the same ones."""
+        """Whether both programs have lines that direct the flow, and the same ones in the same order."""
         one = cls.of(first)
         other = None if one is None else cls.of(second)
         if one is None or other is None:
@@ -97,7 +102,7 @@ class LineOrder:
         return said[0] == said[1]
 
     def behind(self, row: int, known: Mapping[str, float | None]) -> int:
-        """The line behind one; raises `NotPlainError`.
+        """The line that is executed after line `row`; raises `NotPlainError`.
 
         known  the values of variables
         """
@@ -115,7 +120,7 @@ class LineOrder:
         return to
 
     def _led(self, line: LeadingLine, row: int, known: Mapping[str, float | None]) -> int:
-        """Where a line leads; raises `ValueError` or `LookupError` if that is not plain."""
+        """The line to which a line leads; raises `ValueError` or `LookupError` if that is not plain."""
         if line.kind is Lead.JUMP:
             if line.when and _holds(line.when, known) != line.holds:
                 return row + 1
@@ -137,7 +142,7 @@ class LineOrder:
         return line.to
 
     def _again(self) -> int:
-        """The begin of the section that has just ended, or where the program goes on behind it."""
+        """After the end of the innermost section: its first line if executions are left, else its `back`."""
         last = self._open.pop()
         if last.left:
             self._open.append(last._replace(left=last.left - 1))
@@ -166,7 +171,7 @@ COMMENT = re.compile(r";.*|\([A-Z][^()\[\]]*\)[ \t]*$")
 
 
 def _bare(row: str) -> str:
-    """A line without its number, its comment, and blanks that say nothing."""
+    """A line without its number and its comment, with single blanks."""
     return " ".join(COMMENT.sub("", row[HEAD.match(row).end() :]).split())  # type: ignore[union-attr]  # it may be empty
 
 
@@ -214,7 +219,7 @@ def _sinumerik(texts: Sequence[str]) -> dict[int, LeadingLine]:
 
 
 def _unbracketed(condition: str) -> str:
-    """A condition without the brackets about all of it."""
+    """A condition without brackets around the whole of it."""
     inside = condition[1:-1] if condition[:1] + condition[-1:] in ("()", "[]") else condition
     return condition if re.search(r"[()\[\]]", inside) else inside
 

@@ -43,7 +43,7 @@ def positions(text: Text, given: Given) -> list[Given]:
 
 
 MOST_TURNS = 4
-"""A line that is executed more often has to do the same from then on."""
+"""Number of executions of a line that are examined; further ones must do the same as the last of these."""
 MOST_SWITCHES = 4
 """Largest number of switches of block delete whose positions are all examined, as by `fix`."""
 LEAST = 6
@@ -87,15 +87,17 @@ class AxisFollower(FollowedAxes):
         self.foreign: set[int] = set()
         """Lines that a correction may rewrite in a form unknown to this reader."""
         self.turns: dict[int, int] = {}
-        """How often lines are executed, where the program has loops or subprograms that are followed."""
+        """Line -> number of its executions, in a program with loops or subprograms that are followed; else empty."""
         if given.pointless:
             self.lose("numbers without a decimal point count increments")
 
     def run(self, text: Text, turn: int | None = None) -> ProgramSteps:
         """Follow the lines of a program.
 
-        turn  where it has loops or subprograms: of each line comes what it does the first time (0), the second time,
-              ..., or the last time; None: these are not followed. Raises `NotPlainError`.
+        turn  in a program with loops or subprograms, the execution of each line whose step is returned: 0 the first,
+              1 the second, ...; the last if there are fewer. None: loops and subprograms are not followed
+
+        Raises `NotPlainError`.
         """
         order = None if turn is None else LineOrder.of(text)
         if turn is not None and order is not None:
@@ -121,7 +123,7 @@ class AxisFollower(FollowedAxes):
         return log.done()
 
     def _run_along(self, order: LineOrder, lines: Sequence[TextLine], turn: int) -> ProgramSteps:
-        """Follow a program in the order in which its lines are executed."""
+        """Follow a program in the order in which its lines are executed; `turn` as in `run`."""
         made: dict[int, list[AxisStep | None]] = {}
         row = 0
         while row < len(lines) and not self.ended:
@@ -146,7 +148,7 @@ class AxisFollower(FollowedAxes):
         return log.done()
 
     def _line(self, row: int, line: TextLine) -> AxisStep | None:
-        """Follow one line, and log its step."""
+        """Follow one line. Returns its step; None if it is skipped, or moves nothing."""
         behind = self.ended and not (line.path or line.codes)  # the last % is kept
         if line.odd or (not behind and self.is_rewritten):
             self.foreign.add(row)

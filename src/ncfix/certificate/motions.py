@@ -1,4 +1,4 @@
-"""The second reader: whether corrected motions bring the tip where it is meant to be, at their ends and on the way."""
+"""The second reader: whether corrected motions bring the tip to its intended place, at their ends and on the way."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ UNSURE = "which added lines belong to which block is not known"
 
 
 class MotionJudge(Deviations):
-    """Judges motions that this reader can follow; what it finds is in `proof`."""
+    """Judges motions that this reader can follow; the results are added to `proof`."""
 
     def __init__(
         self,
@@ -52,8 +52,8 @@ class MotionJudge(Deviations):
             self.polar = {row for row, line in second.apart() if line.word("PA")}
         """Lines of the corrected program with an angle about a pole, whose digits limit the accuracy of the place."""
         self.begin_apart: set[int] = set()
-        """Motions that begin elsewhere in another position of block delete, or when they are made again: `fix` does not
-        split them, and rapids may leave axes without a word where they stand."""
+        """Motions that begin elsewhere in another position of block delete, or in another execution of their line:
+        `fix` does not split them, and rapids may leave axes without a word where they stand."""
 
     def changed(self, pair: LinePair) -> bool:
         """Whether a line has changed at all."""
@@ -87,7 +87,7 @@ class MotionJudge(Deviations):
         return [self.theirs[row] for row in range(pair.first, pair.last + 1) if row in self.theirs]
 
     def _are_whole(self, moved: Moved) -> Mask:
-        """(m,) motions for which everything is known, of them and their pieces, by which they are judged."""
+        """(m,) whether all that is needed to judge a motion is known, of itself and of its pieces."""
         theirs = self.theirs
         unknown = ~theirs.followed | ~np.isfinite(theirs.end).all(axis=1)
         counts = np.concatenate([[0], np.cumsum(unknown)])
@@ -148,7 +148,7 @@ class MotionJudge(Deviations):
         return same
 
     def _end(self, step: AxisStep, pieces: Sequence[AxisStep], pair: LinePair) -> tuple[str, bool]:
-        """The fault of the end of a motion, "" if it has none, and whether the block is only not proved for it."""
+        """The fault of the end of a motion, "" if it has none; and whether the block then counts as not proved only."""
         assert self.model is not None
         at = self.ours.at[step.row]
         done = self.ends(self.theirs, self.theirs.at[pieces[-1].row])
@@ -267,7 +267,7 @@ class MotionJudge(Deviations):
                 self.proof.fault(text, self.second.lines[pair.first].number, number)
 
     def _excuse(self, pair: LinePair, aside: float) -> str:
-        """The reason for which a way beyond the tolerance is not proved rather than faulty; "" if it is faulty.
+        """The reason why a way beyond the tolerance counts as not proved, not as faulty; "" if it is faulty.
 
         aside  deviation, rad, of the tool, with evenly turning axes, from the plane in which the control turns it
         """

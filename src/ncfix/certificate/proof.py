@@ -86,7 +86,7 @@ class Prover(MotionJudge):
         return pairing
 
     def left_out(self) -> Iterator[int]:
-        """The lines that are skipped, or executed less often than is looked at."""
+        """The lines that are skipped, or that have no further execution for this prover to examine."""
         yield from (row for row, line in self.first.apart() if skips(self.given.skip, line))
         if self.turn:
             yield from (row for row in range(len(self.first.lines)) if self.turns.get(row, 1) <= self.turn)

@@ -73,7 +73,7 @@ class AxisStep:
     """(3, 3) rotation of the coordinates of the program; None: they are not turned."""
 
     def is_like(self, other: AxisStep) -> bool:
-        """Whether another step of the same line does the same."""
+        """Whether another step of the same line makes the same motion."""
         here, there = (
             np.array([*step.start, *step.end, *step.said, *step.centre, step.length, step.sweep, step.unit])
             for step in (self, other)
