@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from ncfix.plugin import Code, Control
 
 BEGIN_PGM = rb"(?im)^[ \t]*(?:/?[ \t]*\d+[ \t]*)?BEGIN[ \t]+PGM\b"
-"""The first block of every Klartext program."""
+"""The block with which every Klartext program begins."""
 
 HEIDENHAIN = Dialect(
     name="heidenhain",
@@ -64,12 +64,12 @@ HEIDENHAIN = Dialect(
 
 @hookimpl
 def register_dialects(register: Register[Dialect]) -> None:
-    """Bring the dialect `heidenhain`."""
+    """Register the dialect `heidenhain`."""
     register(HEIDENHAIN)
 
 
 def klartext_codes() -> Mapping[str, Code]:
-    """What the messages about Klartext programs mean."""
+    """The codes of the messages about Klartext programs, with their explanations."""
     from ncfix_heidenhain.codes import KLARTEXT_CODES
 
     return KLARTEXT_CODES
@@ -77,12 +77,12 @@ def klartext_codes() -> Mapping[str, Code]:
 
 @hookimpl
 def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None:
-    """Bring what the messages about Klartext programs mean."""
+    """Register the codes of the messages about Klartext programs."""
     register(klartext_codes, name="klartext")
 
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
-    """Bring the controls `heidenhain`, axis tables, and `heidenhain-kinematics`, KinematicsComp."""
+    """Register two controls: `heidenhain` (axis tables) and `heidenhain-kinematics` (KinematicsComp)."""
     register(made_by("ncfix_heidenhain.control:Heidenhain"), name="heidenhain")
     register(made_by("ncfix_heidenhain.kinematics:KinematicsComp"), name="heidenhain-kinematics")

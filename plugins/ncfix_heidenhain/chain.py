@@ -1,12 +1,13 @@
-"""The kinematics table of the iTNC 530 with KinematicsComp: made of a machine, read, and followed as a control does.
+"""The kinematics table of the iTNC 530 with KinematicsComp: written for a machine, read, and evaluated as by a control.
 
-Rows `Trans` shift or turn by COORD, and by an error under COMPTAB: a number, or a column of the axis table of an axis,
-as in `A..C2`. Rows `MachAxis` move. The chain runs from the machine base along the head to the gauge line, then, after
-`MachBase`, from the base along the table to the workpiece (KINE-1); errors stand before the axis that they belong to.
+A row `Trans` shifts or turns by COORD plus an error under COMPTAB. The error is a number, or a column of an axis table:
+`A..C2` is column C2 in the table of axis A. A row `MachAxis` moves by the position of its axis. The chain runs from the
+machine base along the head to the gauge line, then, after `MachBase`, from the base along the table to the workpiece
+(KINE-1). The errors of an axis stand before the axis.
 
-The six errors of an axis over its position, location errors included, are given at a point of the axis that stays where
-it is, since they stand before the axis in the chain: what was measured at a point that rides along gets the lever that
-it has gained.
+The table takes the six errors of an axis, its location errors included, as functions of its position. Because they
+stand before the axis in the chain, they count at a fixed point of the axis. The machine gives them at a point that
+moves with the axis, so each angular error, times the way which that point has moved, is added to the position errors.
 """
 
 from __future__ import annotations
@@ -27,23 +28,37 @@ from ncfix_heidenhain.table_files import TableColumn, TextTable, cell_number, re
 
 KEYS = ("Trans", "MachAxis", "MachBase")
 COLUMNS = (("NR", 3), ("DOC", 4), ("KEY", 9), ("AXIS", 5), ("COORD", 16), ("COMPTAB", 7))
-MOST_ROWS = 50
-"""Trans and MachAxis together."""
-MOST_COORDS = 50
-MOST_ERRORS = 100
-"""Less the number of MachAxis."""
+MAX_ROWS = 50
+"""The most rows Trans and MachAxis together."""
+MAX_COORDS = 50
+"""The most entries under COORD."""
+
+MAX_ERRORS = 100
+"""The most entries under COMPTAB and rows MachAxis together."""
+
 LETTERS = "XYZABC"
-FINE = 361
-OTHERS = 16
-"""Poses of the other axes that are averaged over, for errors that depend on them."""
-REACH = 1000.0
-"""mm: the lever with which an angle may act."""
-NOTHING = 1e-9
+SAMPLES = 361
+"""Positions along an axis at which its errors are evaluated before nodes are chosen."""
+
+OTHER_POSES = 16
+"""Poses of the other axes over which errors that depend on them are averaged."""
+
+MAX_LEVER_MM = 1000.0
+"""The lever with which an angular error is taken to act when nodes are chosen for a target in mm."""
+
+NEGLIGIBLE = 1e-9
+"""Errors, shifts and turns up to this (mm, rad or degree) are not written."""
 
 
 @frozen
 class ChainRow:
-    """A row: key, letter, COORD in mm or degree (None where empty), and under COMPTAB a number or (axis, column)."""
+    """A row of the kinematics table.
+
+    key    `Trans`, `MachAxis` or `MachBase`
+    axis   letter of the axis that moves, or along or about which `Trans` acts
+    coord  COORD, mm or degree; None where the cell is empty
+    error  COMPTAB: a number, or (axis, column) of an axis table; None where the cell is empty
+    """
 
     key: str
     axis: str = ""
@@ -53,14 +68,14 @@ class ChainRow:
 
 @frozen
 class ErrorChain:
-    """What the control works out of a kinematics table and the axis tables that it names.
+    """The corrections that the control works out from a kinematics table and the axis tables that it names.
 
-    rows        of the table
-    sense       1 if errors under COMPTAB say how the machine is, -1 if they say what to do about it
+    rows        the rows of the kinematics table
+    sense       1 if entries under COMPTAB are errors of the machine, -1 if they are corrections
     angle       rad per unit of an angle under COMPTAB
-    components  (axis, column) -> the values over that axis, mm or the unit of `angle`
-    own         tables of axes over themselves: corrections
-    length      of the tool, mm
+    components  (axis, column) -> the values by the position of that axis, mm or units of angle
+    own         corrections of axes by their own positions
+    length      length of the tool, mm
     """
 
     rows: tuple[ChainRow, ...]
@@ -71,26 +86,26 @@ class ErrorChain:
     length: float = 0.0
 
     def for_tool(self, length: float) -> ErrorChain:
-        """With a tool of this length: the control knows which one is in the spindle."""
+        """The chain with a tool of this length; the control knows the length of the tool in the spindle."""
         return ErrorChain(self.rows, self.sense, self.angle, self.components, self.own, length)
 
     @property
     def grids(self) -> tuple[Grid, ...]:
-        """Every table."""
+        """All grids: those of the error components, and those of the axes' own corrections."""
         return (*self.components.values(), *Compensation(self.own).grids)
 
     @property
     def axes(self) -> frozenset[str]:
-        """Every axis of the chain."""
+        """The axes that the chain moves."""
         return frozenset(row.axis for row in self.rows if row.key == "MachAxis")
 
     @property
     def points(self) -> int:
-        """The rows of all axis tables."""
+        """The number of points of all grids together."""
         return sum(grid.points for grid in self.grids)
 
     def at(self, names: Sequence[str], q: Array, direction: Array | None = None) -> Array:
-        """See `Tables.at`: each axis by its own table, linear ones also so that the tip is where it is meant."""
+        """See `Tables.at`: own corrections for all axes; linear axes also move the tip to its nominal place."""
         correction = Compensation(self.own).at(names, q, direction)
         linear = [index for index, name in enumerate(names) if name in "XYZ" and name in self.axes]
         nominal = self.tip(names, q, False)
@@ -103,7 +118,7 @@ class ErrorChain:
         return correction
 
     def tip(self, names: Sequence[str], q: Array, wrong: bool) -> Array:
-        """The tip as seen from the workpiece, with or without the errors, (n, 3) mm."""
+        """The tip in the workpiece's coordinates, (n, 3) mm; `wrong`: with the errors of the machine."""
         points = np.tile([0.0, 0.0, -self.length], (len(q), 1))
         base = next((i for i, row in enumerate(self.rows) if row.key == "MachBase"), len(self.rows))
         for row in reversed(self.rows[:base]):
@@ -126,7 +141,7 @@ class ErrorChain:
 
 
 def _acted(points: Array, axis: str, value: Array) -> Array:
-    """Points shifted along, or turned about, a coordinate axis."""
+    """Points shifted along X, Y or Z by a value in mm, or turned about A, B or C by one in rad."""
     moved = points.copy()
     index = LETTERS.index(axis)
     if index < 3:
@@ -140,7 +155,7 @@ def _acted(points: Array, axis: str, value: Array) -> Array:
 
 
 def kinematics_text(rows: Sequence[ChainRow]) -> bytes:
-    """The table as a file."""
+    """The text of the kinematics table."""
     table = []
     for n, row in enumerate(rows):
         coord = "" if row.coord is None else f"{round(row.coord, 9) + 0.0:.9g}"
@@ -150,21 +165,21 @@ def kinematics_text(rows: Sequence[ChainRow]) -> bytes:
 
 
 def over_limits(rows: Sequence[ChainRow]) -> Iterator[str]:
-    """In words, each limit of the control that a table breaks."""
+    """One phrase for each limit of the control that a kinematics table exceeds."""
     axes = sum(row.key == "MachAxis" for row in rows)
     chain = axes + sum(row.key == "Trans" for row in rows)
     coords = sum(row.coord is not None for row in rows)
     errors = sum(row.error is not None for row in rows)
-    if chain > MOST_ROWS:
-        yield f"{chain} rows Trans and MachAxis, and the control takes {MOST_ROWS}"
-    if coords > MOST_COORDS:
-        yield f"{coords} entries under COORD, and the control takes {MOST_COORDS}"
-    if errors > MOST_ERRORS - axes:
-        yield f"{errors} entries under COMPTAB, and the control takes {MOST_ERRORS - axes} with {axes} axes"
+    if chain > MAX_ROWS:
+        yield f"{chain} rows Trans and MachAxis, and the control takes {MAX_ROWS}"
+    if coords > MAX_COORDS:
+        yield f"{coords} entries under COORD, and the control takes {MAX_COORDS}"
+    if errors > MAX_ERRORS - axes:
+        yield f"{errors} entries under COMPTAB, and the control takes {MAX_ERRORS - axes} with {axes} axes"
 
 
 def read_rows(remarks: Remarks, content: bytes) -> tuple[ChainRow, ...]:
-    """The rows of a kinematics table, with remarks."""
+    """The rows of a kinematics table; faults become remarks. Empty if the file is no such table."""
     table = read_table(remarks, content)
     if table is None:
         return ()
@@ -208,12 +223,14 @@ def _row(remarks: Remarks, expected: int, line: int, nr: str, key: str, axis: st
 
 @frozen
 class AxisErrors:
-    """The errors of an axis in its own frame: what stands before it in the chain, and what is looked up by itself.
+    """The errors of an axis in its own frame: six components before it in the chain, and its own error.
 
-    nodes   (n,) mm or rad
-    values  (n, 6) mm and rad, without a rotary axis's own angle
-    own     (n,) a rotary axis's own angle; of a linear axis, what its way changes: both while it moves towards plus
-    back    (n,) the same while it moves towards minus
+    The own error is the positioning error of a rotary axis, plus, for any axis, the half of its play.
+
+    nodes   (n,) positions of the axis, mm or rad
+    values  (n, 6) components C1 to C6, mm and rad; a rotary axis's positioning error is zero here
+    own     (n,) the own error while the axis moves towards plus, mm or rad
+    back    (n,) the own error while the axis moves towards minus, mm or rad
     """
 
     axis: str
@@ -223,18 +240,21 @@ class AxisErrors:
     back: Array
 
     def used(self, column: int) -> bool:
-        """Whether there is anything in a column."""
-        return bool(np.abs(self.values[:, column]).max() > NOTHING)
+        """Whether a component (0 to 5) is other than zero anywhere."""
+        return bool(np.abs(self.values[:, column]).max() > NEGLIGIBLE)
 
 
 def sides(machine: Machine) -> tuple[tuple[Axis, ...], tuple[Axis, ...]]:
-    """The axes of the head from the base to the tool, and those of the table from the base to the workpiece."""
+    """The axes of the head, from the base to the tool, and those of the table, from the base to the workpiece."""
     table = [axis for axis in machine.axes if axis.workpiece_side]
     return tuple(axis for axis in machine.axes if not axis.workpiece_side), tuple(reversed(table))
 
 
 def tilt(axis: Axis) -> Array:
-    """Columns: the frame in which the axis is the coordinate axis of its letter, right way round, (3, 3)."""
+    """A frame (3, 3) in which the axis points along the coordinate axis of its letter; its columns are the directions.
+
+    A table axis moves the workpiece, so its direction is reversed first.
+    """
     wanted = np.asarray(axis.direction) * (-1.0 if axis.workpiece_side else 1.0)
     index = LETTERS.index(axis.name) % 3
     letter = np.eye(3)[index]
@@ -250,7 +270,7 @@ def tilt(axis: Axis) -> Array:
 
 
 def angles(frame: Array) -> tuple[float, float, float]:
-    """A frame as turns about X, then the new Y, then the new Z, degree."""
+    """The turns about X, then the new Y, then the new Z that make a frame, degree."""
     b = float(np.arcsin(np.clip(frame[0, 2], -1.0, 1.0)))
     a = float(np.arctan2(-frame[1, 2], frame[2, 2]))
     c = float(np.arctan2(-frame[0, 1], frame[0, 0]))
@@ -260,23 +280,30 @@ def angles(frame: Array) -> tuple[float, float, float]:
 def axis_errors(
     machine: Machine, space: Array, axis: int, most: int, target: float, play: bool
 ) -> tuple[AxisErrors, bool]:
-    """The errors of one axis, and whether other axes matter to them, over which is averaged; `play`: ways apart."""
+    """The errors of one axis at its nodes, and whether they depend on other axes, over whose poses they are averaged.
+
+    axis    index of the axis
+    most    the most nodes
+    target  the error that may be left, mm
+    play    write a value for each direction of travel, not the mean of both
+    """
     described = machine.axes[axis]
     low, high = space[axis].tolist()
-    fine = np.linspace(low, high, FINE)
-    q = poses_along(axis, fine, even_poses(space, OTHERS))
+    fine = np.linspace(low, high, SAMPLES)
+    q = poses_along(axis, fine, even_poses(space, OTHER_POSES))
     ways = [np.eye(len(space))[axis] * way for way in (1.0, -1.0)]
-    both = [machine.joint_errors(q, State(direction=way))[..., axis, :].reshape(FINE, OTHERS, 6) for way in ways]
-    depends = bool(max(np.ptp(twist, axis=1).max() for twist in both) > NOTHING)
+    shape = SAMPLES, OTHER_POSES, 6
+    both = [machine.joint_errors(q, State(direction=way))[..., axis, :].reshape(shape) for way in ways]
+    depends = bool(max(np.ptp(twist, axis=1).max() for twist in both) > NEGLIGIBLE)
     ahead, back = (_in_frame(described, fine, twist.mean(axis=1)) for twist in both)
     curve = (ahead + back) / 2
     index = LETTERS.index(described.name)
     sense = -1.0 if described.workpiece_side else 1.0
-    own = sense * (ahead - back)[:, index] / 2 if play else np.zeros(FINE)
-    turned = np.zeros(FINE)
+    own = sense * (ahead - back)[:, index] / 2 if play else np.zeros(SAMPLES)
+    turned = np.zeros(SAMPLES)
     if described.rotary:
         turned, curve[:, index] = sense * curve[:, index], 0.0
-    lever = np.array([1.0] * 3 + [REACH] * 3) * 8
+    lever = np.array([1.0] * 3 + [MAX_LEVER_MM] * 3) * 8
     parts = np.concatenate([curve * lever, np.stack([turned + own, turned - own], axis=1) * lever[index]], axis=1)
     count = max(nodes_needed(fine, part, most, target) for part in parts.T)
     step = round((high - low) / described.unit / (count - 1), 4)
@@ -286,7 +313,7 @@ def axis_errors(
 
 
 def _in_frame(axis: Axis, positions: Array, twist: Array) -> Array:
-    """The twist at the point of the axis, in the frame in which it is a coordinate axis, (n, 6)."""
+    """The errors (n, 6) at the fixed point of the axis, along the frame of `tilt`."""
     motion = axis.motion(positions)
     triad = np.asarray(axis.error_axes)
     velocity, turned = twist[:, :3] @ triad, twist[:, 3:] @ triad
@@ -300,9 +327,10 @@ def _in_frame(axis: Axis, positions: Array, twist: Array) -> Array:
 
 
 def chain_rows(machine: Machine, components: Sequence[AxisErrors], angle: float, sense: float) -> tuple[ChainRow, ...]:
-    """The kinematics table: the head, the gauge line with the errors of the spindle, `MachBase`, the table.
+    """The rows of the kinematics table: the head, the spindle with its errors, `MachBase`, the table.
 
-    angle is rad per unit of an angle under COMPTAB, sense what errors are multiplied by there.
+    angle  rad per unit of an angle under COMPTAB
+    sense  factor of the errors that are entered there
     """
     by_axis = {each.axis: each for each in components}
     head, table = sides(machine)
@@ -339,7 +367,8 @@ def _joint(axis: Axis, errors: AxisErrors, way: Array) -> Iterator[ChainRow]:
 def _spindle(machine: Machine, way: Array, angle: float, sense: float) -> Iterator[ChainRow]:
     zero = np.zeros(len(machine.axes))
     twist = sense * machine.joint_errors(zero, State())[-1]
-    fixed = [value if abs(value) > NOTHING else None for value in (*twist[:3].tolist(), *(twist[3:] / angle).tolist())]
+    values = *twist[:3].tolist(), *(twist[3:] / angle).tolist()
+    fixed = [value if abs(value) > NEGLIGIBLE else None for value in values]
     yield from _trans("XYZ", way.tolist(), fixed[:3])
     yield from _trans("ABC", [0.0] * 3, fixed[3:])
     tool = Axis("Z", False, False, machine.tool.direction)
@@ -350,6 +379,6 @@ def _trans(
     letters: str, coords: Sequence[float], errors: Sequence[float | tuple[str, str] | None]
 ) -> Iterator[ChainRow]:
     for letter, coord, error in zip(letters, coords, errors, strict=True):
-        some = abs(coord) > NOTHING
+        some = abs(coord) > NEGLIGIBLE
         if some or error is not None:
             yield ChainRow("Trans", letter, coord if some else None, error)

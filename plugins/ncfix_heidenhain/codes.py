@@ -1,4 +1,4 @@
-"""The codes of following Klartext programs."""
+"""The codes of the messages that appear while a Klartext program is followed."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""Heidenhain's axis compensation: `.COM` tables of the axes over one another, and the `.CMA` file that binds them.
+"""Heidenhain's axis compensation: `.COM` tables of corrections, and the `.CMA` file that assigns them to axes.
 
-The rule (MANUALplus 620 technical manual, of the same NCK family as TNC 640): the axis that a column of a `.COM` file
-is named after is moved as a function of the axis in whose column of the `.CMA` file that `.COM` file is entered.
+The rule (MANUALplus 620 technical manual, of the same NCK family as TNC 640): `config.cma` has one column per axis, in
+which a `.COM` file is entered. The position of that axis is looked up in the `.COM` file, and each column of the
+`.COM` file moves the axis that it is named after.
 """
 
 from __future__ import annotations
@@ -22,14 +23,14 @@ from ncfix.tables.lower_bounds import least_of_sums
 from ncfix.tables.table_files import DEGREE, ORDER, Remarks, in_order, messages_of, unit_of
 from ncfix_heidenhain.table_files import CONFIG, ComTable, cma_text, nck_text, old_text, read_cma, read_com
 
-MOST = 256
-"""Entries of a file of the older controls; of the newer ones no number is public."""
+MAX_ROWS = 256
+"""The most rows of a `.COM` file on the older controls; for the newer ones no number is public."""
 TABLES = re.compile(rb"\s*BEGIN[ \t]+\S+\.(?:COM|CMA)\b", re.IGNORECASE)
 SIGN = "sign.txt"
-"""Keeps the sign that was settled for the machine beside the files."""
+"""The file, beside the tables, that keeps the sign which was settled for the machine (HEID-1)."""
 SIGNS = ("error", "correction")
-LARGEST = 9.9999
-"""mm, degree: what the columns of the peer's files hold."""
+MAX_CELL = 9.9999
+"""The largest value that fits into the columns of a public converter's files (HEID-5), mm or degree."""
 
 
 class Heidenhain(FileControl):
@@ -46,7 +47,7 @@ class Heidenhain(FileControl):
         quantum=(1e-4, 1e-4 * DEGREE),
         extrapolation="taken as held at the first and last row (HEID-2)",
         bidirectional=True,
-        max_points=MOST,
+        max_points=MAX_ROWS,
         max_tables=len(ORDER),
         combine="sum over the axes that are looked up",
     )
@@ -96,7 +97,7 @@ class Heidenhain(FileControl):
             "tnc640", "tnc640: NCK controls; itnc530: datum and distance in the first line", one_of("tnc640", "itnc530")
         ),
         "backlash": Option("off", "on: a column BACKLASH; off: the mean of both ways", one_of("off", "on")),
-        "points": Option(str(MOST), f"most rows of a file, at most {MOST}", whole(2, MOST)),
+        "points": Option(str(MAX_ROWS), f"most rows of a file, at most {MAX_ROWS}", whole(2, MAX_ROWS)),
     }
     steps = (
         "Settle HEID-1 on the machine.",
@@ -111,7 +112,7 @@ class Heidenhain(FileControl):
     switch_off = "Mark a line of config.cma that has no files as active, or empty the columns."
 
     def write(self, request: Request) -> Written:
-        """A `.COM` file for each axis over which anything changes, `config.cma`, and the sign in words."""
+        """One `.COM` file per axis on whose position any correction depends, `config.cma`, and the sign as a word."""
         settings = self.settings(request.settings)
         sense = sign_of(settings["sign"])
         old = settings["family"] == "itnc530"
@@ -126,8 +127,8 @@ class Heidenhain(FileControl):
         for line in needed:
             com = _as_file(line, sense, axes if old else None, both)
             largest = max(float(np.abs(values).max()) for values in com.columns.values())
-            if largest > LARGEST:
-                text = f"{tables[line.input]} would have to hold {largest:.3f}, and its columns end at {LARGEST}"
+            if largest > MAX_CELL:
+                text = f"{tables[line.input]} would have to hold {largest:.3f}, and its columns end at {MAX_CELL}"
                 raise RefusedError.of("NCF484", text, hint="is the error in mm?")
             as_text = old_text if old else nck_text
             files[tables[line.input]] = as_text(tables[line.input], com, 4)
@@ -138,7 +139,7 @@ class Heidenhain(FileControl):
         return Written(files, notes, least)
 
     def examined(self, files: Files) -> tuple[Compensation, list[Remarks]]:
-        """The tables of the active line of the `.CMA`, with the sign that is kept beside them."""
+        """The compensation by the `.COM` files of the active line of `config.cma`, with the sign from `sign.txt`."""
         axes, tables, config = read_cma(files)
         remarks, terms = [config], []
         sign = files.get(SIGN, b"").decode("latin-1").strip()
@@ -156,11 +157,11 @@ class Heidenhain(FileControl):
         return Compensation(tuple(terms)), remarks
 
     def knows(self, name: str, content: bytes) -> bool:
-        """A `.COM` or a `.CMA`, by the name in its first line."""
+        """Whether a file is a `.COM` or a `.CMA`, which the name in its first line tells."""
         return TABLES.match(content) is not None
 
     def look(self, files: Files) -> tuple[Message, ...]:
-        """See `Control`; without the sign, and `.COM` files by themselves if there is no `.CMA`."""
+        """See `Control`; the sign may be missing, and without a `.CMA` each `.COM` file is checked by itself."""
         configs = [name for name in files if name.lower().endswith(".cma")]
         if SIGN in files:
             return self.lint(files)
@@ -202,7 +203,7 @@ def _letter(name: str, axes: tuple[str, ...], remarks: Remarks | None) -> str | 
 
 
 def _rounded(line: AxisTables) -> AxisTables:
-    """What is left of a line when its values have four decimals: columns of zeros go."""
+    """The tables of an axis with values of four decimals, without other axes' columns that then hold only zeros."""
     units = np.array([unit_of(name) for name in line.outputs])
     values = np.round(line.values / units, 4) * units
     columns = [i for i, name in enumerate(line.outputs) if values[:, i].any() or name == line.input]
@@ -223,12 +224,15 @@ def _as_file(line: AxisTables, sense: float, numbered: tuple[str, ...] | None, b
 
 
 def sign_of(text: str) -> float:
-    """What turns a correction into a value, for one of SIGNS."""
+    """The factor that turns a correction into a value of the file: 1 for `correction`, -1 for `error`."""
     return 1.0 if text == "correction" else -1.0
 
 
 def play_left(request: Request, done: Compensation, both: bool) -> Iterator[str]:
-    """What to say of play that tables leave, and of the setting that takes up that of axes along themselves."""
+    """Notes on play that the tables leave uncorrected; `both`: --set backlash=on was given.
+
+    Where that setting would correct the play of an axis along itself, a note says so.
+    """
     machine = request.machine
     left = list(reversal_note(machine, request.space, request.tool_length, done))
     yield from left

@@ -1,4 +1,4 @@
-"""Heidenhain's KinematicsComp (iTNC 530, option 52): the errors of every axis in a description of the whole machine."""
+"""Heidenhain's KinematicsComp (iTNC 530, option 52): a kinematics table that contains the errors of every axis."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from ncfix_heidenhain.chain import (
     over_limits,
     read_rows,
 )
-from ncfix_heidenhain.control import MOST, SIGNS, play_left, sign_of
-from ncfix_heidenhain.table_files import CONFIG, LARGE, ComTable, cma_text, old_text, read_cma, read_com
+from ncfix_heidenhain.control import MAX_ROWS, SIGNS, play_left, sign_of
+from ncfix_heidenhain.table_files import CONFIG, MAX_CREDIBLE, ComTable, cma_text, old_text, read_cma, read_com
 
 TABLE = "kinematics.tab"
 UNITS = "units.txt"
@@ -50,7 +50,7 @@ class KinematicsComp(FileControl):
         quantum=(1e-7, 1e-7),
         extrapolation="taken as held at the first and last row",
         bidirectional=True,
-        max_points=MOST,
+        max_points=MAX_ROWS,
         max_tables=18,
         combine="a kinematic chain with the errors of all axes",
     )
@@ -103,7 +103,7 @@ class KinematicsComp(FileControl):
             "on: play of the axes, in their own columns and BACKLASH; off: the mean of both ways",
             one_of("off", "on"),
         ),
-        "points": Option(str(MOST), f"most rows of an axis table, at most {MOST}", whole(2, MOST)),
+        "points": Option(str(MAX_ROWS), f"most rows of an axis table, at most {MAX_ROWS}", whole(2, MAX_ROWS)),
     }
     steps = (
         "Settle KINE-1 to KINE-3 on the machine.",
@@ -116,7 +116,7 @@ class KinematicsComp(FileControl):
     switch_off = "Empty the COMPTAB column, and mark a line of config.cma that has no files as active."
 
     def write(self, request: Request) -> Written:
-        """The kinematics table, an axis table for each axis, and `config.cma`."""
+        """The kinematics table, one axis table per axis that has errors, `config.cma`, and sign and unit as words."""
         settings = self.settings(request.settings)
         sense = -sign_of(settings["sign"])
         angle = ANGLES[settings["angle_unit"]]
@@ -131,8 +131,8 @@ class KinematicsComp(FileControl):
         files, tables = {TABLE: kinematics_text(chain)}, {}
         for each in components:
             com = _com(each, axes, sense, angle)
-            if any(np.abs(values).max() > LARGE for values in com.columns.values()):
-                text = f"an error of {each.axis} beyond {LARGE} mm or degree"
+            if any(np.abs(values).max() > MAX_CREDIBLE for values in com.columns.values()):
+                text = f"an error of {each.axis} beyond {MAX_CREDIBLE} mm or degree"
                 raise RefusedError.of("NCF484", text, hint="is the error in mm and rad?")
             if com.columns:
                 tables[each.axis] = f"AXIS-{each.axis}.COM"
@@ -144,7 +144,7 @@ class KinematicsComp(FileControl):
         return Written(files, (*notes, *play_left(request, done, play)))
 
     def examined(self, files: Files) -> tuple[ErrorChain, list[Remarks]]:
-        """The chain, as the control would follow it."""
+        """The kinematic chain that the control would work out of the files, with remarks on them."""
         axes, tables, config = read_cma(files)
         table = Remarks.of(TABLE, files.get(TABLE, b""))
         chain = read_rows(table, files.get(TABLE, b""))
@@ -163,15 +163,15 @@ class KinematicsComp(FileControl):
         return ErrorChain(chain, sense, angle, components, tuple(own)), remarks
 
     def reached(self, machine: Machine, tables: Tables) -> str:
-        """Without a rotary axis in the chain there is nothing of theirs in it."""
+        """See `Control`; rotary errors (R-VOL) are corrected only on machines with rotary axes."""
         return self.reaches if machine.rotary.any() else "L-VOL"
 
     def knows(self, name: str, content: bytes) -> bool:
-        """A kinematics table with columns of compensation tables."""
+        """Whether a file is a kinematics table with a column COMPTAB."""
         return CHAIN.search(content) is not None
 
     def look(self, files: Files) -> tuple[Message, ...]:
-        """Kinematics tables by themselves."""
+        """See `Control`; without `units.txt` each kinematics table is checked by itself."""
         if UNITS in files:
             return self.lint(files)
         remarks = [Remarks.of(name, content) for name, content in sorted(files.items())]
@@ -189,7 +189,10 @@ def _axes(machine: Machine) -> tuple[str, ...]:
 
 
 def _com(errors: AxisErrors, axes: tuple[str, ...], sense: float, angle: float) -> ComTable:
-    """The table of an axis: C1 to C6 where there is anything in them, and the own angle of a rotary axis."""
+    """The axis table of an axis: those of its errors C1 to C6 that are not zero, and its own correction with BACKLASH.
+
+    The own correction is that of a rotary axis's angle, or of the play of an axis.
+    """
     columns, back = {}, None
     if max(np.abs(errors.own).max(), np.abs(errors.back).max()) > 1e-9:
         columns[str(axes.index(errors.axis) + 1)] = sense * errors.own / unit_of(errors.axis)
@@ -203,7 +206,7 @@ def _com(errors: AxisErrors, axes: tuple[str, ...], sense: float, angle: float) 
 def _grids(
     axis: str, com: ComTable, axes: tuple[str, ...], sense: float, remarks: Remarks
 ) -> tuple[dict[tuple[str, str], Grid], list[Term]]:
-    """The columns C1 to C6 of an axis as they stand in the file, and the table of the axis over itself."""
+    """The columns C1 to C6 of an axis with the file's values, and the corrections of the axis by its own position."""
     components: dict[tuple[str, str], Grid] = {}
     own: list[Term] = []
     nodes = com.nodes * unit_of(axis)
@@ -218,7 +221,7 @@ def _grids(
 
 
 def _own(axis: str, nodes: Array, values: Array, com: ComTable, factor: float) -> tuple[Term, ...]:
-    """The table of an axis over itself: BACKLASH in its place while it travels towards minus."""
+    """The corrections of an axis by its own position; while it travels towards minus, BACKLASH counts instead."""
     if com.backlash is None or np.array_equal(values, factor * com.backlash):
         return (Term((Grid((axis,), (nodes,), (axis,), values[:, None]),)),)
     return own_terms(axis, nodes, values, factor * com.backlash)

@@ -1,12 +1,15 @@
-"""Heidenhain's free tables, and the axis compensation tables that are such: `.COM` and `.CMA`.
+"""Heidenhain's free tables, and the axis compensation files that have this form: `.COM` and `.CMA`.
 
 A free table has a BEGIN line, a line of column names, rows in fixed columns, and [END]. A column begins where its name
-begins and ends where the next one does; that is all there is to it. What is read can be written again to the byte.
+begins, and ends where the next name begins. A table that was read can be written again byte for byte.
 
-`.COM` files hold values over the positions of one axis, a column for every axis that they move. Two forms: that of the
-NCK controls (TNC 640, 620, 320, MANUALplus), with the position in a column of its own, and that of the iTNC 530, with
-datum and distance in the BEGIN line and columns named by axis numbers, `1=F()`. `config.cma` says which `.COM` file an
-axis looks up, a column for every axis, the active line marked with `*`.
+A `.COM` file holds values for positions of one axis, with one column per axis that they move. It has two forms:
+
+- NCK controls (TNC 640, 620, 320, MANUALplus): the positions stand in a column of their own.
+- iTNC 530: first position and distance stand in the BEGIN line, and columns are named by axis numbers, `1=F()`.
+
+`config.cma` has one column per axis, with the name of the `.COM` file in which the axis is looked up; its active line
+is marked with `*`.
 """
 
 from __future__ import annotations
@@ -31,15 +34,15 @@ NCK_BEGIN = re.compile(r"(\S+) (MM|INCH)(?: +(?i:VERSION): *'[^']*')?(?: +U)?\s*
 OLD_BEGIN = re.compile(r"(\S+)\s+DATUM:([-+]?\d+\.?\d*)\s+DISTANCE:([-+]?\d+\.?\d*)\s*")
 FUNCTION = re.compile(r"(\d+)=F\(\)")
 COMPONENT = re.compile(r"C[1-6]")
-LARGE = 1.0
-"""mm or degree: no machine is that wrong; most likely the unit is."""
-STEEP = 1 / 64
-"""Change of a value per distance that the older controls allow."""
+MAX_CREDIBLE = 1.0
+"""The largest value that is believed, mm or degree; no machine has such an error, so most likely the unit is wrong."""
+MAX_SLOPE = 1 / 64
+"""The largest change of a value per distance that the older controls allow."""
 
 
 @frozen
 class TableColumn:
-    """A column: its name, and its width in characters."""
+    """A column of a table: its name, and its width in characters."""
 
     name: str
     width: int
@@ -47,15 +50,15 @@ class TableColumn:
 
 @frozen
 class TextTable:
-    """A table as text.
+    """A free table as it stands in its file.
 
-    begin    the words of the BEGIN line after BEGIN, blanks included; "" where there is no such line
-    columns  in their order
-    rows     a cell for each column
-    lines    the line that each row is on
-    ended    whether it ends with [END]
-    padded   whether blanks fill the last column
-    eol      between lines
+    begin    what follows BEGIN in the first line, blanks included; "" without such a line
+    columns  the columns, in their order
+    rows     the cells of each row, one per column
+    lines    the line number of each row in the file
+    ended    the table ends with [END]
+    padded   blanks fill the last column to its width
+    eol      line end
     """
 
     begin: str
@@ -67,11 +70,11 @@ class TextTable:
     eol: str = "\n"
 
     def text(self) -> bytes:
-        """The file."""
+        """The content of the file."""
         return "".join(f"{line}{self.eol}" for line in self._lines()).encode("ascii")
 
     def cells(self, name: str) -> list[str]:
-        """One column, "" where it is missing."""
+        """The cells of the column of that name; "" in each row if there is no such column."""
         names = [column.name for column in self.columns]
         return [row[names.index(name)] if name in names else "" for row in self.rows]
 
@@ -90,7 +93,7 @@ class TextTable:
 
 
 def read_table(remarks: Remarks, content: bytes) -> TextTable | None:
-    """The table in a file; None, with a remark, where there is none."""
+    """The table in a file; None, with a remark, if the file holds no table."""
     lines = [line for line in enumerate(remarks.rows, 1) if line[1].strip()]
     if not lines:
         remarks.refuse(0, "is empty")
@@ -133,7 +136,7 @@ def _cells(remarks: Remarks, cell_number: int, line: str, columns: Sequence[Tabl
 
 
 def cell_number(remarks: Remarks, line: int, cell: str, name: str) -> float:
-    """A number in a cell; a remark and nan where it is none."""
+    """The number in a cell; NaN, with a remark, if it is no number."""
     found = as_number(cell)
     if found is not None:
         return found
@@ -143,7 +146,7 @@ def cell_number(remarks: Remarks, line: int, cell: str, name: str) -> float:
 
 
 def cma_text(axes: Sequence[str], tables: Mapping[str, str]) -> bytes:
-    """One line, active: the file of every axis that has one."""
+    """The text of `config.cma`: one line, marked active, with the file of every axis that has one."""
     width = max(13, *(len(name) + 2 for name in tables.values())) if tables else 13
     columns = (TableColumn("NR", 5), TableColumn(ACTIVE, 7), *(TableColumn(axis, width) for axis in axes))
     row = ("0", "*", *(tables.get(axis, "") for axis in axes))
@@ -151,7 +154,7 @@ def cma_text(axes: Sequence[str], tables: Mapping[str, str]) -> bytes:
 
 
 def read_cma(files: Files) -> tuple[tuple[str, ...], dict[str, str], Remarks]:
-    """All axes in their order, and the file of each in the active line; with remarks."""
+    """All axes of the `.cma` in their order, the file of each axis in the active line, and remarks."""
     names = [name for name in files if name.lower().endswith(".cma")]
     if len(names) != 1:
         remarks = Remarks.of(CONFIG, b"")
@@ -179,11 +182,11 @@ def read_cma(files: Files) -> tuple[tuple[str, ...], dict[str, str], Remarks]:
 
 @frozen
 class ComTable:
-    """A table as it is in the file, mm and degree.
+    """The content of a `.COM` file, in mm and degree.
 
-    nodes     positions of the axis, (n,)
-    columns   letter of an axis, number of an axis, or C1 to C6 -> values, (n,)
-    backlash  of the axis itself in negative travel, (n,); None where there is no such column
+    nodes     (n,) positions of the axis
+    columns   letter of an axis, number of an axis, or C1 to C6 -> values (n,)
+    backlash  (n,) values of the axis itself in negative travel; None without such a column
     """
 
     nodes: Array
@@ -192,14 +195,14 @@ class ComTable:
 
 
 def nck_text(name: str, com: ComTable, decimals: int) -> bytes:
-    """The form of the NCK controls."""
+    """The text of a `.COM` file in the form of the NCK controls."""
     heads = [POSITION, *([BACKLASH] if com.backlash is not None else []), *com.columns]
     values = [com.nodes, *([com.backlash] if com.backlash is not None else []), *com.columns.values()]
     return _com_text(f"{name} MM", [(head, 14) for head in heads], values, decimals, True)
 
 
 def old_text(name: str, com: ComTable, decimals: int) -> bytes:
-    """The form of the iTNC 530; the nodes must be evenly spaced."""
+    """The text of a `.COM` file in the form of the iTNC 530; the nodes must be evenly spaced."""
     backlash = np.zeros_like(com.nodes) if com.backlash is None else com.backlash
     step = (com.nodes[-1] - com.nodes[0]) / (len(com.nodes) - 1)
     begin = f"{name}  DATUM:{com.nodes[0]:+.4f} DISTANCE:{step:+.4f}"
@@ -217,7 +220,7 @@ def _com_text(
 
 
 def read_com(path: str, content: bytes) -> tuple[ComTable | None, Remarks]:
-    """A table of either form, with remarks."""
+    """The content of a `.COM` file of either form, and remarks; None if something in it is wrong."""
     remarks = Remarks.of(path, content)
     table = read_table(remarks, content)
     if table is None:
@@ -276,11 +279,12 @@ def _com_values(remarks: Remarks, table: TextTable, name: str) -> Array:
 
 
 def _look(remarks: Remarks, table: TextTable, nodes: Array, columns: Mapping[str, Array]) -> None:
-    """Values that are too large, and those that change faster than any axis errs."""
+    """Remark on values that are too large, and on values that change faster than the error of any axis does."""
     for name, values in columns.items():
-        for row in np.flatnonzero(np.abs(values) > LARGE)[:1]:
+        for row in np.flatnonzero(np.abs(values) > MAX_CREDIBLE)[:1]:
             remarks.refuse(table.lines[row], f"{values[row]:g} under {name}, which no machine needs", "mm, not um")
         slopes = np.abs(np.diff(values)) / np.diff(nodes)
-        for row in np.flatnonzero(slopes > STEEP)[:1]:
-            text = f"{name} changes by {slopes[row]:.3g} per unit from the row before; older controls allow {STEEP:.3g}"
+        for row in np.flatnonzero(slopes > MAX_SLOPE)[:1]:
+            slope, limit = f"{slopes[row]:.3g}", f"{MAX_SLOPE:.3g}"
+            text = f"{name} changes by {slope} per unit from the row before; older controls allow {limit}"
             remarks.doubt(table.lines[row + 1], text, "a slip of the digits?")

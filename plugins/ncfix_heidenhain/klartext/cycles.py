@@ -1,13 +1,14 @@
-"""CYCL DEF and what executes cycles: CYCL CALL, M99, M89.
+"""CYCL DEF, and what executes cycles: CYCL CALL, M99, M89.
 
-Source: TNC 640, "Cycle programming". A drilling cycle is one motion per hole to its bottom, which is corrected. Of a
-pocket, a stud or a thread, which the control makes about the place of the call, that place and the bottom are; other
-cycles that make a path of their own are refused.
+Of a drilling cycle one motion per hole is corrected, that to its bottom. The control makes a pocket, a stud or a thread
+around the place of the call: that place and the bottom are corrected. Other cycles with a path of their own are
+refused.
 
-Patterns of holes: PATTERN DEF, which CYCL CALL PAT works off, and the cycles 220 (on a circle) and 221 (on lines).
+Patterns of holes: PATTERN DEF, whose holes CYCL CALL PAT makes, and the cycles 220 (on a circle) and 221 (on lines).
+Their positions are in program units along the axes of the program's frame. In which order the control makes the holes
+does not matter.
 
-Source: TNC 640, "Cycle programming", "Pattern definition" and "Point patterns". Positions are in program units along
-the axes of the program's frame; in which order the control takes them makes no difference to a hole.
+Source: TNC 640, "Cycle programming", also "Pattern definition" and "Point patterns".
 """
 
 from __future__ import annotations
@@ -36,35 +37,42 @@ from ncfix_heidenhain.klartext.transformations import cycle_19
 
 NO_CYCLE = "NCF272"
 DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
-"""Cycles whose bottom is Q203 + Q201; back boring (204) counts otherwise."""
+"""Drilling cycles whose bottom is at Q203 + Q201; back boring (204) counts its depth differently."""
 
 BORE_MILLING = 208
-"""It mills round the place where it is called, and comes back to it."""
+"""The cycle that mills a hole around the place of the call, and returns there."""
+
 OLD_MILLING = frozenset({3, 4, 5})
 MILLING = OLD_MILLING | {251, 252, 253, 256, 257, 258, 262, 263, 264, 265, 267}
-"""Pockets, slots, studs and threads about the place where they are called, down to Q203 + Q201, or as `OLD` ones. A
-round slot (254) may have its place in the cycle."""
+"""Cycles for pockets, slots, studs and threads around the place of the call, down to Q203 + Q201 (or as in `OLD`).
+
+A round slot (254) is not one of them: the cycle itself may state its place.
+"""
 
 IN_SPACE = frozenset({*range(20, 26), 204, *range(210, 216), 225, *range(230, 234), 254, *range(270, 278)})
-"""Cycles with a path of their own that move X, Y and Z only; others, on the shell of a cylinder, turn axes, too."""
+"""Cycles with a path of their own that move X, Y and Z only; others (on cylinder surfaces) turn rotary axes, too."""
 
 OLD = frozenset({1, 2, 17, 18}) | OLD_MILLING
-"""Cycles that count how deep they go from where they are called; the names of what they say are in any language."""
+"""Cycles that count their depth from the height at which they are called.
+
+Their words are told apart by the number of the part (`1.2`), because their names depend on the language of the control.
+"""
 GAP_PART, DEPTH_PART, THREAD_CUTTING = "1", "2", 18
-"""Parts of an old cycle, `1.2`; thread cutting has its depth first, and no clearance."""
+"""In old cycles part 1 (`1.1`) is the clearance, part 2 the depth; thread cutting starts with depth, no clearance."""
+
 LAST = re.compile(rf"{VALUE}\s*\Z", re.IGNORECASE)
 ADJUSTING = frozenset({291, 800, 801, 880, *range(1000, 1100)})
 ADJUSTED = "cycle {} may change coordinates, for turning or grinding, in a way that is not followed"
 BUILDERS = range(300, 400)
 LEADING = frozenset({224, 238})
-"""A pattern in the form of a code, and a run that measures the state of the machine."""
+"""Cycles that move where they are defined: a data matrix code of holes, and a measurement of the machine's state."""
 TILT = 19
 OF_BUILDER = "cycle {} is the machine builder's; what it does where it is defined is not known"
 BY_ITSELF = "cycle {} moves the axes by itself where it is defined"
 CALLING = 12
 CALLED = "a program is called by cycle 12, and what it does is not followed"
 HARMLESS = frozenset({9, 13, 32, 239, 392})
-"""Dwell, spindle orientation, tolerance, load, and the like: they move nothing."""
+"""Cycles that move nothing: dwell, spindle orientation, tolerance, load, and the like."""
 
 OWN_PATH = "cycle {} makes a path of its own, which is not corrected"
 AFTER_HOLE = "where the axis {} stands after a hole of unknown depth is not followed"
@@ -78,7 +86,7 @@ FROM_INCREMENT = "an old cycle is called from a height in increments (IZ)"
 
 
 def define(control: KlartextControl, name: str, words: MotionWords, text: str) -> None:
-    """A CYCL DEF block: `name` is `200`, or `7.1`."""
+    """Execute a CYCL DEF block: `name` is `200`, or `7.1` for part 1 of cycle 7."""
     whole, _, part = name.partition(".")
     cycle = int(whole)
     if cycle in transformations.ACTS:
@@ -114,7 +122,7 @@ def define(control: KlartextControl, name: str, words: MotionWords, text: str) -
 
 
 def executes(control: KlartextControl, step: Step) -> bool:
-    """Whether a positioning block executes the cycle in force: M99, or M89 before or in it. M99 ends M89."""
+    """Whether a positioning block executes the cycle in force: by M99, or by M89 in it or before it. M99 ends M89."""
     if 89 in step.codes:
         control.cycle.modal = True
     once, modal = 99 in step.codes, control.cycle.modal
@@ -124,7 +132,7 @@ def executes(control: KlartextControl, step: Step) -> bool:
 
 
 def call(control: KlartextControl, step: Step) -> None:
-    """Execute the cycle in force at the position of a block, or where the axes stand."""
+    """Execute the cycle in force at the position to which a block leads, or where the axes stand."""
     cycle = control.cycle
     if cycle.number == 0:
         raise Fault(NO_CYCLE, "a cycle is called, and none is defined before")
@@ -153,7 +161,7 @@ def call(control: KlartextControl, step: Step) -> None:
 
 
 def pattern(control: KlartextControl, places: tuple[HolePosition, ...] | None, name: str) -> None:
-    """The cycle in force at places that the control works out."""
+    """Execute the cycle in force at all places of a pattern; `places` is None if they are not known."""
     control.use()
     if control.cycle.number == 0:
         raise Fault(NO_CYCLE, "a pattern of holes, and no cycle is defined before")
@@ -171,7 +179,7 @@ def pattern(control: KlartextControl, places: tuple[HolePosition, ...] | None, n
 
 
 def drill(control: KlartextControl, where: FramePosition, axes: int, heights: tuple[float, float, str]) -> None:
-    """One hole."""
+    """Make one hole over a position; `heights`: bottom and clearance, mm, and why they are not known."""
     bottom, clear, refusal = heights
     over = FramePosition(where.inner[:], dict(where.unknown))
     where.inner[Z] = bottom
@@ -195,7 +203,10 @@ def drill(control: KlartextControl, where: FramePosition, axes: int, heights: tu
 
 
 def levels(control: KlartextControl, height: float) -> tuple[float, float, str]:
-    """Bottom and clearance of the cycle in force along the tool axis of the frame, mm; and why they are not known."""
+    """Bottom and clearance height of the cycle in force along Z of the frame, mm, and why they are not known.
+
+    height  the height at which the cycle is called, mm
+    """
     cycle, unit = control.cycle, control.stretch
     if cycle.number in OLD:
         depth, gap = value_of_part(cycle.steps, DEPTH_PART), value_of_part(cycle.steps, GAP_PART)
@@ -219,13 +230,16 @@ def levels(control: KlartextControl, height: float) -> tuple[float, float, str]:
 
 
 def value_of_part(steps: Mapping[str, float], part: str) -> float | None:
-    """What an old cycle says in one of its parts; None of a part with no value, or several."""
+    """The value in one part of an old cycle; None if the part has no value, or several."""
     values = [value for key, value in steps.items() if key.partition(":")[0] == part]
     return values[0] if len(values) == 1 else None
 
 
 def own_path(control: KlartextControl, step: Step) -> None:
-    """A cycle that is not followed: after it X, Y and Z stand nowhere known, and of most cycles the other axes do."""
+    """Refuse a cycle with a path of its own: X, Y and Z are not known after it.
+
+    The other axes are known only after cycles that move X, Y and Z alone (`IN_SPACE`).
+    """
     position, unknown = control.position[:], dict(control.unknown)
     control.refuse_here(OWN_PATH.format(control.cycle.number))
     if control.cycle.number in IN_SPACE and not step.words.axes >> (Z + 1):
@@ -236,8 +250,8 @@ def own_path(control: KlartextControl, step: Step) -> None:
 # -- patterns of holes -------------------------------------------------------------------------------------------------
 
 ON_CIRCLE, ON_LINES = 220, 221
-MOST_HOLES = 100_000
-"""A pattern of more counts as one whose holes are not known."""
+MAX_HOLES = 100_000
+"""The most holes of a pattern; those of a larger one count as not known."""
 
 KINDS = re.compile(r"(POS|ROW|PAT|FRAME|PITCHCIRC|CIRC)\s*\d*\s*\(([^()]*)\)", re.IGNORECASE)
 WORDS = re.compile(rf"(I?[XY]|Z|DX|DY|D|NUMX|NUMY|NUM|ROTX|ROTY|ROT|START|STEP|END)\s*({VALUE})", re.IGNORECASE)
@@ -246,7 +260,7 @@ Values = Mapping[str, float]
 
 
 def pattern_of(text: str, parameters: QParameters) -> tuple[HolePosition, ...] | None:
-    """The places of a PATTERN DEF; None if they are known only at run time, or their form is not."""
+    """The places of a PATTERN DEF; None if they are known only at run time, or some word is not understood."""
     code = LEFT_OUT.sub(" ", text)
     found: list[HolePosition] = []
     certain = True
@@ -254,7 +268,7 @@ def pattern_of(text: str, parameters: QParameters) -> tuple[HolePosition, ...] |
         said = {name.upper(): number(value, parameters) for name, value in WORDS.findall(inside)}
         certain &= numbers(said.values()) is not None
         values = {name: nominal(value) for name, value in said.items()}
-        if not understood(inside, values) or holes(values) + len(found) > MOST_HOLES:
+        if not understood(inside, values) or holes(values) + len(found) > MAX_HOLES:
             return None
         found += FORMS[kind.upper()](values, found)
     rest = KINDS.sub(" ", code).split()
@@ -262,12 +276,12 @@ def pattern_of(text: str, parameters: QParameters) -> tuple[HolePosition, ...] |
 
 
 def understood(inside: str, values: Values) -> bool:
-    """Every word was read, and the pattern is not bent."""
+    """Whether every word was read, and the pattern is not distorted by ROTX or ROTY."""
     return not WORDS.sub(" ", inside).strip() and not values.get("ROTX") and not values.get("ROTY")
 
 
 def holes(values: Values) -> float:
-    """How many holes a pattern has at most."""
+    """The most holes that a pattern with these words can have."""
     return max(values.get("NUM", 0.0), max(values.get("NUMX", 0.0), 1.0) * max(values.get("NUMY", 0.0), 1.0))
 
 
@@ -275,7 +289,7 @@ def holes(values: Values) -> float:
 
 
 def position(values: Values, before: list[HolePosition]) -> Iterator[HolePosition]:
-    """POS: one hole, perhaps counted from the one before."""
+    """POS: one hole; IX and IY count from the hole before."""
     x, y = (before[-1].x, before[-1].y) if before else (0.0, 0.0)
     x = values["X"] if "X" in values else x + values.get("IX", 0.0)
     y = values["Y"] if "Y" in values else y + values.get("IY", 0.0)
@@ -283,7 +297,7 @@ def position(values: Values, before: list[HolePosition]) -> Iterator[HolePositio
 
 
 def grid(values: Values, steps: Iterator[tuple[float, float]]) -> Iterator[HolePosition]:
-    """Holes so far from the first along its axes."""
+    """Holes at these distances from the first hole, along the axes of a pattern that is turned by ROT."""
     turn = math.radians(values.get("ROT", 0.0))
     for u, v in steps:
         x = values.get("X", 0.0) + u * math.cos(turn) - v * math.sin(turn)
@@ -297,14 +311,14 @@ def row(values: Values, before: list[HolePosition]) -> Iterator[HolePosition]:
 
 
 def lines(values: Values, before: list[HolePosition]) -> Iterator[HolePosition]:
-    """PAT: lines of holes."""
+    """PAT: a grid of NUMX by NUMY holes."""
     across, along = int(values.get("NUMX", 0)), int(values.get("NUMY", 0))
     dx, dy = values.get("DX", 0.0), values.get("DY", 0.0)
     return grid(values, ((i * dx, j * dy) for j in range(along) for i in range(across)))
 
 
 def frame(values: Values, before: list[HolePosition]) -> Iterator[HolePosition]:
-    """FRAME: the outer holes of PAT."""
+    """FRAME: the outermost holes of such a grid."""
     across, along = int(values.get("NUMX", 0)), int(values.get("NUMY", 0))
     dx, dy = values.get("DX", 0.0), values.get("DY", 0.0)
     outer = ((i, j) for j in range(along) for i in range(across) if i in (0, across - 1) or j in (0, along - 1))
@@ -312,7 +326,7 @@ def frame(values: Values, before: list[HolePosition]) -> Iterator[HolePosition]:
 
 
 def circle(values: Values, before: list[HolePosition]) -> Iterator[HolePosition]:
-    """CIRC, and PITCHCIRC with the angle from hole to hole, or that of the last one."""
+    """CIRC: holes spread evenly over a circle. PITCHCIRC: with the angle STEP, or from START to END."""
     count = int(values.get("NUM", 0))
     start, step = values.get("START", 0.0), values.get("STEP")
     if step is None:
@@ -337,13 +351,13 @@ FORMS: Mapping[str, Callable[[Values, list[HolePosition]], Iterator[HolePosition
 
 
 def pattern_of_cycle(cycle: int, parameters: QParameters) -> tuple[HolePosition, ...] | None:
-    """The places of cycle 220 or 221, from the Q parameters; None if they are known only at run time."""
+    """The places of the holes of cycle 220 or 221, from Q parameters; None if they are not known, or too many."""
     names = CIRCLE_WORDS if cycle == ON_CIRCLE else LINE_WORDS
     known = numbers(parameters.get(name) for name in names.values())
     if known is None:
         return None
     values = dict(zip(names, known, strict=True))
-    if holes(values) > MOST_HOLES:
+    if holes(values) > MAX_HOLES:
         return None
     if cycle == ON_LINES:
         return tuple(lines(values, []))

@@ -1,4 +1,4 @@
-"""Straight motions: L, LN, LP, blocks of words alone, machine coordinates, approach and departure.
+"""Straight motions (L, LN, LP, blocks of words alone), motions in machine coordinates, approach and departure.
 
 Source: TNC 640, "Programming: contours", "Multiple axis machining", "Miscellaneous functions for coordinate data".
 """
@@ -41,12 +41,12 @@ IN_TRAVEL = WayRules(in_travel=True)
 IN_SPACE = 0b111
 """The bits of X, Y and Z."""
 
-STILL = 1e-9
-"""rad; an axis that is told to go where it stands does not turn."""
+STILL_RAD = 1e-9
+"""A rotary axis whose end is this near its start does not turn."""
 
 
 def straight(control: KlartextControl, step: Step) -> None:
-    """L, LN, and blocks of words alone."""
+    """Execute L, LN, or a block of words alone."""
     control.use()
     end = destination(control, step.words)
     if not {"TX", "TY", "TZ"} & step.words.values.keys():
@@ -71,7 +71,7 @@ def straight(control: KlartextControl, step: Step) -> None:
 
 
 def pointed(control: KlartextControl, words: MotionWords) -> dict[int, float] | None:
-    """The rotary positions that point the tool along TX TY TZ, the nearest; None if that is not known."""
+    """The nearest rotary positions that point the tool along TX TY TZ; None if they are not known."""
     vector = unit((words.values.get("TX", 0.0), words.values.get("TY", 0.0), words.values.get("TZ", 0.0)))
     if vector is None or not control.m128:
         return None
@@ -80,7 +80,7 @@ def pointed(control: KlartextControl, words: MotionWords) -> dict[int, float] | 
 
 
 def straight_polar(control: KlartextControl, step: Step) -> None:
-    """LP."""
+    """Execute LP."""
     control.use()
     where, _ = polar(control, step.words)
     axes = polar_axes(control, step.words)
@@ -89,13 +89,13 @@ def straight_polar(control: KlartextControl, step: Step) -> None:
 
 
 def name_polar(control: KlartextControl, step: Step) -> None:
-    """PR and PA say where the axes of the plane are as well as their own words."""
+    """Note that the program has stated where the axes of the plane are, if the block has both PR and PA."""
     if {"PR", "PA"} <= step.words.values.keys():
         control.places.place(control.path.plane.axes)
 
 
 def run(control: KlartextControl, step: Step, end: MotionEnd, axes: int, *, follows: bool = False) -> None:
-    """A straight motion."""
+    """Make a straight motion; `axes`: bit mask of the axes that it names; `follows`: it counts from where it starts."""
     turned = [index for index in control.turning if axes >> index & 1]
     positioning = turned and (not axes & IN_SPACE or turns(control, turned, end))
     if positioning and control.plane_tilted and not control.m128:
@@ -113,13 +113,13 @@ def run(control: KlartextControl, step: Step, end: MotionEnd, axes: int, *, foll
 
 
 def turns(control: KlartextControl, indices: Sequence[int], end: MotionEnd) -> bool:
-    """Whether some of these axes move, or may."""
+    """Whether any of these axes moves, or may move since its start or end is not known."""
     lost = control.unknown.keys() | end.unknown.keys()
-    return any(index in lost or abs(end.target[index] - control.position[index]) > STILL for index in indices)
+    return any(index in lost or abs(end.target[index] - control.position[index]) > STILL_RAD for index in indices)
 
 
 def keep_tangent(control: KlartextControl, start: Vector, unknown: UnknownAxes) -> None:
-    """Note in which direction a straight motion went; one without a way leaves the direction as it was."""
+    """Note the direction of a straight motion that has just been made; one without a length leaves it as it was."""
     if any(index in unknown or index in control.unknown for index in range(3) if index in control.axis_indices):
         control.path.tangent = None
         return
@@ -130,9 +130,9 @@ def keep_tangent(control: KlartextControl, start: Vector, unknown: UnknownAxes) 
 
 
 def take_short_way(control: KlartextControl, step: Step, target: Vector, axes: int) -> str:
-    """M126: rotary axes go the shorter way round; where one stands is said by a number that makes it so.
+    """M126: add whole turns to the present positions of rotary axes, so that each goes the shorter way to its end.
 
-    Returns why the motion is refused: of increments of more than half a turn the manuals do not say what it makes.
+    Returns why the motion is refused: what M126 makes of increments of more than half a turn the manuals do not say.
     """
     for index in control.axis_indices:
         if not (control.rotary[index] and axes >> index & 1) or index in control.unknown:
@@ -145,7 +145,7 @@ def take_short_way(control: KlartextControl, step: Step, target: Vector, axes: i
 
 
 def turn_under_tilt(control: KlartextControl, step: Step, end: MotionEnd, axes: int) -> None:
-    """Rotary axes that move in a tilted plane without M128: X Y Z of the machine stand still, the tip does not."""
+    """Turn rotary axes in a tilted plane without M128: X Y Z of the machine stand still, so the tip moves."""
     target, still = end.target, [index for index in control.axis_indices if not control.rotary[index]]
     linear = any(axes >> index & 1 for index in range(len(target)) if not control.rotary[index])
     switch(control, control.tools.vector, False, control.tools.offset)
@@ -165,7 +165,7 @@ def turn_under_tilt(control: KlartextControl, step: Step, end: MotionEnd, axes: 
 
 
 def at_machine(control: KlartextControl, step: Step) -> None:
-    """A motion in machine coordinates: M91, or M92."""
+    """Execute a motion in machine coordinates (M91, M92)."""
     code, (axes, unsure) = "M91" if 91 in step.codes else "M92", in_machine(control, step.words)
     if code == "M92":
         zero = control.setup.references.get(code, {})
@@ -185,7 +185,7 @@ def at_machine(control: KlartextControl, step: Step) -> None:
 
 
 def approach(control: KlartextControl, step: Step) -> None:
-    """APPR: to the first point of the contour, which its words give; the control makes the way there."""
+    """APPR: a motion to the first point of the contour, which the words state; the control makes the way there."""
     control.use()
     where = polar(control, step.words)[0] if " p" in step.name else programmed_position(control, step.words)
     axes = polar_axes(control, step.words) if " p" in step.name else step.words.axes
@@ -200,9 +200,10 @@ def approach(control: KlartextControl, step: Step) -> None:
 
 
 def departure(control: KlartextControl, step: Step) -> None:
-    """DEP: with an end point of its own (LCT) it is corrected there; else it is what the contour before makes of it.
+    """DEP: with an end point of its own (LCT) it is corrected like APPR; otherwise its end follows from the contour.
 
-    Beside the contour, with RL or RR, the tool may end by its radius beside the element that it follows (LT).
+    The end is known only of DEP LT without radius compensation: with RL or RR the tool may end beside that line, by its
+    radius.
     """
     beside, control.modal.compensated = control.modal.compensated, 0
     if step.name.endswith("lct"):

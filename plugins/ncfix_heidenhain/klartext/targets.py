@@ -1,7 +1,7 @@
-"""Where the words of a block lead: absolute and incremental words, Cartesian and polar, and what is known of it.
+"""Where the words of a block lead: absolute and incremental, Cartesian and polar words; and how far that is known.
 
-A position along the axes of the program's frame is called inner (mm and rad), a command outer. An axis of the frame is
-known if all axes of the machine that it is made of are.
+A position along the axes of the program's frame (mm and rad) is called inner; a command to the machine is called outer.
+An axis of the frame is known if all machine axes on which it depends are known.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ POLE_MOVED = "where the axis {} goes from a pole (CC) that was set before the da
 COUNTED_FROM = "where the axis {} stands after incremental words with M91 depends on what the control counts from"
 RUNTIME = "where the axis {} stands depends on a Q parameter that is known only at run time"
 PLANE_OF = {frozenset((X, Y)): PLANES[170], frozenset((Z, X)): PLANES[180], frozenset((Y, Z)): PLANES[190]}
-"""Planes by their axes; the angle is counted from the first axis (X, Z, Y) towards the second."""
+"""Set of two axes -> their plane; polar angles count from its first axis (X, Z, Y) towards its second."""
 
 
 @frozen
@@ -39,47 +39,51 @@ class MotionWords:
 
     @property
     def axes(self) -> int:
-        """A bit mask of the axes that have a word; polar words stand for those of the plane (see `polar_axes`)."""
+        """Bit mask of the axes that have a word of their own; `polar_axes` adds those that polar words move."""
         return _said(tuple(self.values))[0]
 
     @property
     def incremental(self) -> bool:
-        """Some word counts from where the axis stands."""
+        """Whether any word is incremental."""
         return _said(tuple(self.values))[1]
 
     @property
     def letters(self) -> tuple[str, ...]:
-        """The axes that have a word."""
+        """The letters of the axes that have a word."""
         return _said(tuple(self.values))[2]
 
 
 @lru_cache(maxsize=1024)
 def _said(addresses: tuple[str, ...]) -> tuple[int, bool, tuple[str, ...]]:
-    """What the addresses of words say: `axes`, `incremental` and `letters` of `MotionWords`."""
+    """`axes`, `incremental` and `letters` of `MotionWords` with these addresses."""
     letters = tuple(letter for address in addresses if (letter := address.removeprefix("I")) in INDEX)
     return mask_of({INDEX[letter] for letter in letters}), any(address[0] == "I" for address in addresses), letters
 
 
 @mutable
 class FramePosition:
-    """A position along the axes of the frame, and why some of it is not known."""
+    """A position along the axes of the program's frame.
+
+    inner    the position, mm and rad
+    unknown  axis -> why its position is not known
+    """
 
     inner: Vector
     unknown: UnknownAxes
 
 
 def here(control: KlartextControl) -> FramePosition:
-    """Where the control stands."""
+    """The present position of the control in the program's frame."""
     return FramePosition(control.program_position(), dict(control.lost_in_frame()))
 
 
 def destination(control: KlartextControl, words: MotionWords) -> MotionEnd:
-    """Where the motion of a block ends."""
+    """The end of a motion with Cartesian words, as a command."""
     return command_of(control, programmed_position(control, words), words.axes)
 
 
 def programmed_position(control: KlartextControl, words: MotionWords) -> FramePosition:
-    """The position to which the words of axes lead."""
+    """The position in the program's frame to which the words of axes lead."""
     if words.incremental:
         counted = [INDEX[address[1:]] for address in words.values if address[0] == "I" and address[1:] in INDEX]
         control.use_start_positions(list(control.axis_indices) if control.is_rotated else counted)
@@ -103,10 +107,10 @@ def programmed_position(control: KlartextControl, words: MotionWords) -> FramePo
 
 
 def derived(control: KlartextControl, words: MotionWords, axes: int) -> str:
-    """Why a motion cannot be said anew by words for all of `axes`: where some stand follows from no word.
+    """Why a motion cannot be rewritten with words for all of `axes`: no word says where some axis stands. Else empty.
 
-    Directions of the tool say where its axes go. Polar words, and arcs of which an end has one word, count from a place
-    that the program may not have said.
+    TX TY TZ say where the rotary axes go. Incremental polar words, and arcs whose end has only one word, count from a
+    place that the program may not have stated.
     """
     if not control.places.unplaced:
         return ""
@@ -120,14 +124,14 @@ def derived(control: KlartextControl, words: MotionWords, axes: int) -> str:
 
 
 def command_of(control: KlartextControl, where: FramePosition, axes: int) -> MotionEnd:
-    """A position as a command; axes without a word stay exactly where they are."""
+    """A position in the program's frame as a command; axes that are not in `axes` stay exactly where they are."""
     return MotionEnd(control.command(where.inner, axes), control.axes_of(where.unknown), where.unknown)
 
 
 def in_machine(control: KlartextControl, words: MotionWords) -> tuple[dict[int, float], UnknownAxes]:
-    """Where words in machine coordinates (M91) lead axes, and why that is not known, see `led_in_machine`.
+    """Axis -> where words in machine coordinates (M91, M92) lead it; axis -> why that is not known.
 
-    Increments count from the last such position, if any.
+    Incremental words count from the last position in machine coordinates, if there is one: that is not known.
     """
     axes, unsure = dict[int, float](), dict[int, str]()
     for address, value in words.values.items():
@@ -145,7 +149,7 @@ def in_machine(control: KlartextControl, words: MotionWords) -> tuple[dict[int, 
 
 
 def set_pole(control: KlartextControl, words: MotionWords) -> None:
-    """CC: the pole, absolute or from where the tool stands; a coordinate that is left out stays, none takes both."""
+    """CC: set the pole. A coordinate that CC leaves out stays; CC alone takes both from where the tool stands."""
     path = control.path
     named = frozenset(
         INDEX[address.removeprefix("I")] for address in words.values if address.removeprefix("I") in "XYZ"
@@ -168,13 +172,13 @@ def set_pole(control: KlartextControl, words: MotionWords) -> None:
 
 
 def pole_frame(control: KlartextControl) -> object:
-    """What the numbers of a pole mean: datum along the axes of its plane, rotation, unit."""
+    """What determines where the numbers of a pole are: datum along the axes of its plane, rotation, unit."""
     plane = control.path.plane
     return plane.of(control.offset), control.rotation, control.stretch
 
 
 def polar(control: KlartextControl, words: MotionWords) -> tuple[FramePosition, float | None]:
-    """The position that polar words lead to, and by which angle it was reached from the present one (IPA), rad."""
+    """The position to which polar words lead, and the angle IPA, rad; None without IPA."""
     path = control.path
     if path.pole is None:
         raise Fault(BAD_POLE, "polar coordinates, and no pole (CC) is known")
@@ -196,7 +200,11 @@ def polar(control: KlartextControl, words: MotionWords) -> tuple[FramePosition, 
 
 
 def arm(values: Mapping[str, float], away: tuple[float, float], unit: float) -> tuple[float, float]:
-    """Distance from the pole, mm, and angle, rad, to which polar words lead axes that stand `away` from it."""
+    """Distance from the pole, mm, and angle, rad, to which polar words lead.
+
+    away  the way from the pole to the start, mm
+    unit  mm per program unit
+    """
     radius, angle = math.hypot(*away), math.atan2(away[1], away[0])
     if "PR" in values:
         radius = unit * values["PR"]
@@ -210,7 +218,7 @@ def arm(values: Mapping[str, float], away: tuple[float, float], unit: float) -> 
 
 
 def doubt(control: KlartextControl, words: MotionWords, start: FramePosition) -> str:
-    """Why it is not known where polar words lead from a start; empty if it is."""
+    """Why it is not known where polar words lead from a start; empty if it is known."""
     plane = control.path.plane
     if not {"PR", "PA"} <= words.values.keys():
         for index in plane.pair:
@@ -222,11 +230,11 @@ def doubt(control: KlartextControl, words: MotionWords, start: FramePosition) ->
 
 
 def polar_axes(control: KlartextControl, words: MotionWords) -> int:
-    """The axes that a motion in polar coordinates moves."""
+    """Bit mask of the axes that a motion in polar coordinates moves."""
     return words.axes | control.path.plane.axes
 
 
 def starts_unknown(control: KlartextControl) -> bool:
-    """Where the motion begins is not known in X Y Z."""
+    """Whether the start of the motion is unknown in X, Y or Z."""
     control.use_start_positions([index for index, why in control.unknown.items() if why is AT_START])
     return any(index in control.unknown for index in (X, Y, Z) if index in control.axis_indices)

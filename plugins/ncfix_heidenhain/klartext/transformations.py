@@ -1,16 +1,16 @@
 """Coordinate transformations of a program: datum, mirror, rotation, scale and preset, by cycles and by TRANS.
 
-Mirror, rotation and scale act about the datum that is in force when they are programmed. A shift that follows a tilt is
-counted along the tilted axes. What the manuals leave open, or make depend on the order, is `doubtful`: nothing is
-corrected until it has been reset. So it is where a function (TRANS MIRROR, ROTATION, SCALE of the TNC7) and a cycle of
-the same kind (8, 10, 11) are used at once: how they act upon each other is left open.
+Mirror, rotation and scale act about the datum that is in force when they are programmed. A shift after a tilt counts
+along the tilted axes. Where the manuals do not say how transformations combine, the result is `doubtful`: nothing is
+corrected until they are reset. The same holds where a function (TRANS MIRROR, ROTATION, SCALE of the TNC7) and a cycle
+of the same kind (8, 10, 11) are in force at once.
 Sources: TNC 640, "Coordinate systems" and "Cycles: coordinate transformations"; TNC7, "NC functions for coordinate
 transformation".
 
-PLANE, and cycle 19: from angles, vectors or points to a tilted plane.
+PLANE and cycle 19 tilt the plane by angles, vectors or points.
 
-Source: TNC 640, "The PLANE function: tilting the working plane", and "Cycle 19". Where TURN and MOVE take the rotary
-axes follows from the machine's kinematics; MOVE also moves the linear axes, which are not known after it.
+Source: TNC 640, "The PLANE function: tilting the working plane", and "Cycle 19". The kinematics of the machine say
+where TURN and MOVE take the rotary axes; MOVE also moves the linear axes, which are not known after it.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ AT_RUN_TIME = "the datum of the axis {} is known only at run time"
 NOT_FOLLOWED = "TRANS {} with words that are not followed"
 BOTH = "TRANS {} and a cycle of the same kind at once: how they add up is not sure"
 BY_FUNCTION = {8: "MIRROR", 10: "ROTATION", 11: "SCALE"}
-"""What a TRANS function can do, too."""
+"""Cycle -> the TRANS function that does the same."""
 
 NO_PRESET = "the number of the preset is known only at run time"
 
@@ -62,20 +62,20 @@ NO_PRESET = "the number of the preset is known only at run time"
 
 
 def is_plain(control: KlartextControl) -> bool:
-    """Neither mirror nor rotation nor scale is active."""
+    """Whether neither mirror nor rotation nor scale is active."""
     frames = control.frames
     return frames.mirror.rotation == IDENTITY and control.turn == 0.0 and frames.scaling.scale == 1.0
 
 
 def put_turned(control: KlartextControl, frames: FrameStack) -> None:
-    """Take another mirror, rotation or scale into force: mirror and rotation do not commute."""
+    """Put another mirror, rotation or scale into force; mirror with rotation is doubtful, since their order matters."""
     if frames.mirror.rotation != IDENTITY and control.turn:
         control.doubtful = MIRROR_AND_ROTATION
     put(control, frames)
 
 
 def put(control: KlartextControl, frames: FrameStack) -> None:
-    """Take frames into force; with everything reset nothing is doubtful."""
+    """Put frames into force; nothing is doubtful any more once everything is reset."""
     control.frames = frames
     shifted = any(frames.programmable.shift) or any(frames.local.shift)
     if is_plain(control) and not control.plane_tilted and not shifted:
@@ -83,7 +83,7 @@ def put(control: KlartextControl, frames: FrameStack) -> None:
 
 
 def shift_axis(control: KlartextControl, letter: str, value: float, *, incremental: bool) -> None:
-    """Cycle 7, or TRANS DATUM, for one axis; mm or rad."""
+    """Shift the datum of one axis by cycle 7 or TRANS DATUM; `value` in mm or rad."""
     index, frames = INDEX[letter], control.frames
     along_plane = control.plane_tilted and index < 3
     here = frames.local if along_plane else frames.programmable
@@ -100,7 +100,7 @@ def shift_axis(control: KlartextControl, letter: str, value: float, *, increment
 
 
 def mirror_axes(control: KlartextControl, letters: frozenset[str]) -> None:
-    """Cycle 8: these axes are mirrored; none ends it."""
+    """Mirror these axes (cycle 8); none ends mirroring."""
     if letters & frozenset("ABC"):
         control.doubtful = MIRRORED_ROTARY
     rotation = mirrored("".join(letters))
@@ -108,19 +108,19 @@ def mirror_axes(control: KlartextControl, letters: frozenset[str]) -> None:
 
 
 def rotate_by(control: KlartextControl, degrees: float, *, incremental: bool) -> None:
-    """Cycle 10."""
+    """Rotate in the working plane, degrees (cycle 10)."""
     control.turn = (control.turn if incremental else 0.0) + degrees
     rotation = turned_in(PLANES[170], control.turn) if control.turn else WORLD
     put_turned(control, replace(control.frames, rotation=rotation))
 
 
 def scale_by(control: KlartextControl, factor: float) -> None:
-    """Cycle 11."""
+    """Scale by a factor (cycle 11)."""
     put_turned(control, replace(control.frames, scaling=Affine(scale=factor)))
 
 
 def with_plane(control: KlartextControl, tilt: Rotation | None) -> FrameStack:
-    """The frames with a tilted plane, None for none; shifts along the axes of one that is left become plain ones."""
+    """The frames with a tilted plane, or without one (None): shifts along its axes then become plain datum shifts."""
     frames = control.frames
     if any(frames.local.shift):
         control.doubtful = SHIFT_UNDER_TILT
@@ -135,7 +135,7 @@ def with_plane(control: KlartextControl, tilt: Rotation | None) -> FrameStack:
 
 
 def trans(control: KlartextControl, text: str) -> None:
-    """A TRANS function but DATUM AXIS and DATUM RESET."""
+    """Execute a TRANS function other than DATUM AXIS and DATUM RESET."""
     found = FORM.match(text)
     assert found is not None, "the grammar asks for one of these"
     kind, rest = found["kind"].upper(), found["rest"].strip()
@@ -150,25 +150,25 @@ def trans(control: KlartextControl, text: str) -> None:
 
 
 def reset_datum(control: KlartextControl) -> None:
-    """TRANS DATUM RESET."""
+    """Execute TRANS DATUM RESET."""
     for letter in LETTERS:
         shift_axis(control, letter, 0.0, incremental=False)
     datum_unknown(control, {})
 
 
 def from_table(control: KlartextControl) -> None:
-    """The datum comes from a table."""
+    """Note that the datum comes from a table, and so is not known."""
     datum_unknown(control, dict.fromkeys(range(len(LETTERS)), FROM_TABLE))
 
 
 def datum_unknown(control: KlartextControl, why: dict[int, str]) -> None:
-    """Along which letters the datum is not known, and why."""
+    """Note for which axes (by index) the datum is not known, and why; for the others it is."""
     control.frames = replace(control.frames, programmable=replace(control.frames.programmable, unknown=why))
     control.recompose()
 
 
 def note_source(control: KlartextControl, kind: str, *, by_function: bool) -> None:
-    """A transformation is about to be set: notice if the one in force came from the other of cycle and function."""
+    """Note what sets a transformation; suspend corrections if one of the other source (function, cycle) is in force."""
     frames = control.frames
     in_force = {
         "MIRROR": frames.mirror.rotation != IDENTITY,
@@ -181,7 +181,7 @@ def note_source(control: KlartextControl, kind: str, *, by_function: bool) -> No
 
 
 def put_in_force(control: KlartextControl, kind: str, rest: str) -> bool:
-    """Do what the words of a function say; False if they are not its own."""
+    """Execute a TRANS MIRROR, ROTATION or SCALE; False if its words are not understood."""
     reset, number = rest.upper() == "RESET", NUMBER.match(rest)
     word = "RESET" if reset else number["word"].upper() if number else ""
     value = float("".join(number["value"].split()).replace(",", ".")) if number else 0.0
@@ -200,7 +200,7 @@ def put_in_force(control: KlartextControl, kind: str, rest: str) -> bool:
 
 
 def transform(control: KlartextControl, cycle: int, part: str, words: MotionWords, text: str) -> None:
-    """A part of one of the cycles `ACTS`, `part` 1 of `CYCL DEF 10.1 ROT+35`, with its words and its text."""
+    """Execute a part (1 in `CYCL DEF 10.1 ROT+35`) of one of the cycles `ACTS`; `text`: its words without value."""
     says = part == "1" if cycle in (8, 10, 11) else cycle != 26 or part not in ("", "0")
     if says:
         if cycle in BY_FUNCTION:
@@ -229,7 +229,7 @@ def shift(control: KlartextControl, words: MotionWords, text: str) -> None:
 
 
 def mirror(control: KlartextControl, words: MotionWords, text: str) -> None:
-    """Cycle 8: `8.1 X Y`, the axes that are mirrored; none ends it."""
+    """Cycle 8: `8.1 X Y` mirrors these axes; `8.1` alone ends mirroring."""
     mirror_axes(control, frozenset(text.upper()) & frozenset("XYZABC"))
 
 
@@ -250,14 +250,14 @@ def scale(control: KlartextControl, words: MotionWords, text: str) -> None:
 
 
 def scale_axes(control: KlartextControl, words: MotionWords, text: str) -> None:
-    """Cycle 26: `26.1 X1.4 Y0.6`: nothing is corrected while an axis has a scale of its own."""
+    """Cycle 26: `26.1 X1.4 Y0.6`; nothing is corrected while an axis has a scale of its own."""
     control.resume("scales")
     if any(factor != 1.0 for key, factor in words.values.items() if key in "XYZ"):
         control.suspend("scales", "a scale of single axes (cycle 26)")
 
 
 def preset(control: KlartextControl, words: MotionWords, text: str) -> None:
-    """Cycle 247: the preset of the row Q339."""
+    """Cycle 247: activate the preset in row Q339 of the preset table."""
     number = control.scope.parameters.get("Q339")
     control.resume(PRESET)
     if isinstance(number, Unknown):
@@ -267,7 +267,7 @@ def preset(control: KlartextControl, words: MotionWords, text: str) -> None:
 
 
 def suspend(control: KlartextControl, words: MotionWords, what: str) -> None:
-    """Nothing is corrected while a transformation depends on what is known only at run time."""
+    """Suspend corrections while a transformation depends on what is known only at run time."""
     control.resume(what)
     if words.unknown:
         control.suspend(what, f"the {what} of the coordinates is known only at run time")
@@ -287,7 +287,7 @@ ACTS: Mapping[int, Callable[[KlartextControl, MotionWords, str], None]] = {
 
 BAD_PLANE = "NCF273"
 RETRACTING = "mb max"
-"""The tool is drawn back before the axes turn."""
+"""The flag of a PLANE block with MB: the tool is retracted before the axes turn."""
 
 POSITIONED = "where the axis {} stands after PLANE ... TURN or MOVE the control works out"
 NOT_NORMAL = "the tool does not stand normal to the tilted plane, by the axis positions of the program"
@@ -300,19 +300,19 @@ ANGLES = "NCF284"
 ANGLES_HINT = "a machine parameter decides: compare Q120 to Q122 on the control, or use PLANE"
 NO_KINEMATICS = "the tilted plane is given by the positions of rotary axes (PLANE AXIAL, cycle 19)"
 CALCULATED = ("Q120", "Q121", "Q122")
-"""Where the control leaves the positions of A, B and C that it has worked out."""
+"""The parameters in which the control stores the positions of A, B and C that it has worked out."""
 
 Values = Mapping[str, float]
 
 
 def by_vectors(values: Values) -> Rotation | None:
-    """PLANE VECTOR: base vector and normal."""
+    """PLANE VECTOR: the plane by its base vector and normal."""
     base, normal = ([values.get(f"{kind}{axis}", 0.0) for axis in "XYZ"] for kind in "BN")
     return from_vectors((base[0], base[1], base[2]), (normal[0], normal[1], normal[2]))
 
 
 def by_points(values: Values) -> Rotation | None:
-    """PLANE POINTS."""
+    """PLANE POINTS: the plane through three points."""
     first, second, third = ([values.get(f"P{number}{axis}", 0.0) for axis in "XYZ"] for number in "123")
     return from_points(
         (first[0], first[1], first[2]), (second[0], second[1], second[2]), (third[0], third[1], third[2])
@@ -320,12 +320,12 @@ def by_points(values: Values) -> Rotation | None:
 
 
 def by_angles(values: Values) -> Rotation:
-    """PLANE SPATIAL."""
+    """PLANE SPATIAL: the plane by three spatial angles."""
     return spatial({letter: values.get(f"SP{word}", 0.0) for letter, word in zip("XYZ", "ABC", strict=True)})
 
 
 def by_projection(values: Values) -> Rotation | None:
-    """PLANE PROJECTED."""
+    """PLANE PROJECTED: the plane by two projected angles and a rotation; None from 90 degrees on."""
     first, second = values.get("PROPR", 0.0), values.get("PROMIN", 0.0)
     return None if max(abs(first), abs(second)) >= 90 else projected(first, second, values.get("ROT", 0.0))
 
@@ -340,7 +340,7 @@ FORMS: Mapping[str, Callable[[Values], Rotation | None]] = {
 
 
 def plane(control: KlartextControl, form: str, words: MotionWords, flags: frozenset[str]) -> None:
-    """A PLANE block."""
+    """Execute a PLANE block; `form` is `spatial`, `reset`, ..."""
     values = words.values
     if "MB" in values:
         flags |= {RETRACTING}
@@ -364,9 +364,9 @@ def plane(control: KlartextControl, form: str, words: MotionWords, flags: frozen
 
 
 def is_idle(control: KlartextControl, flags: frozenset[str]) -> bool:
-    """Whether the end of a tilt changes nothing: none has begun, and where the rotary axes stand is not asked yet.
+    """Whether the end of a tilt changes nothing: no tilt is in force, and no rotary start position was needed yet.
 
-    Many programs begin with it. Then Q120 to Q122 are not known.
+    Many programs begin so; Q120 to Q122 are then not known.
     """
     asked = any(control.rotary[index] and why is AT_START for index, why in control.unknown.items())
     turns = flags & {"turn", "move", RETRACTING}
@@ -378,7 +378,7 @@ def is_idle(control: KlartextControl, flags: frozenset[str]) -> bool:
 
 
 def by_axes(control: KlartextControl, values: Values, flags: frozenset[str]) -> None:
-    """PLANE AXIAL: the plane to which rotary axes at these positions make the tool normal. TURN goes to just these."""
+    """PLANE AXIAL: the plane to which the tool is normal with rotary axes at these positions; TURN moves them there."""
     way = {index: values[letter] * DEGREE for letter, index in INDEX.items() if letter in values}
     staying = {index: control.position[index] for index in control.turning if index not in way}
     plane = None if staying.keys() & control.unknown.keys() else plane_of(control, values)
@@ -387,7 +387,7 @@ def by_axes(control: KlartextControl, values: Values, flags: frozenset[str]) -> 
 
 
 def plane_of(control: KlartextControl, values: Values) -> Rotation | None:
-    """The plane to which rotary axes at positions in degrees make the tool normal; None if nobody knows."""
+    """The plane to which the tool is normal with rotary axes at these positions (degrees); None if it is not known."""
     turned = control.position[:]
     for letter in "ABC":
         if letter in values:
@@ -403,7 +403,7 @@ def tilt_to(
     refusal: str = "",
     way: dict[int, float] | None = None,
 ) -> None:
-    """Make a tilted plane the frame; None: none. `way`: where the rotary axes go, if the block says it."""
+    """Put a tilted plane into force, or end it (None); `way`: where rotary axes go, if the block states it."""
     frames, control.plane_tilted = with_plane(control, tilt), tilt is not None
     control.resume(TILTED)
     if refusal:
@@ -426,14 +426,14 @@ def tilt_to(
 
 
 def chosen_way(control: KlartextControl, tilt: Rotation | None, flags: frozenset[str]) -> dict[int, float] | None:
-    """The rotary positions that the control works out, by letter; None where that is not known or not sure.
+    """Axis -> the rotary position that the control works out for a plane; None if that is not known or not sure.
 
-    SEQ (or SYM) says which of the two ways is taken by the sign of the master axis, the one that tilts the tool when
-    all rotary axes stand at zero. Without it the nearest is.
+    SEQ (or SYM) chooses between the two solutions by the sign of the master axis, the one that tilts the tool when all
+    rotary axes stand at zero. Without it the nearest solution is taken.
 
-    Where the tool is square to the plane wherever the axis next to the workpiece stands, that axis is free: by COORD
-    ROT, which counts where nothing is said, some controls turn it to zero, others leave it; by TABLE ROT it takes over
-    the rotation of the plane. Only where it stands at zero already, all is one.
+    At the pole the axis next to the workpiece is free: the tool is square to the plane at any of its positions. With
+    COORD ROT, the default, some controls turn it to zero, and others leave it; with TABLE ROT it takes over the
+    rotation of the plane. All agree only if it already stands at zero and the plane is not rotated by TABLE ROT.
     """
     signs = (-1 if flag.endswith("-") else 1 for flag in flags if flag[:3] in ("seq", "sym"))
     normal = normal_of(IDENTITY if tilt is None else tilt)
@@ -450,7 +450,7 @@ def chosen_way(control: KlartextControl, tilt: Rotation | None, flags: frozenset
 
 
 def way_home(control: KlartextControl) -> dict[int, float] | None:
-    """PLANE RESET with TURN or MOVE: the rotary axes go to their basic position, zero; None where zero is shifted."""
+    """Where PLANE RESET with TURN or MOVE takes the rotary axes: to zero; None if their datum is shifted."""
     if any(control.offset[index] for index in control.turning):
         return None
     if any(index in control.unknown or abs(control.position[index]) > AT_ZERO for index in control.turning):
@@ -459,7 +459,7 @@ def way_home(control: KlartextControl) -> dict[int, float] | None:
 
 
 def turn_axes(control: KlartextControl, way: dict[int, float] | None) -> None:
-    """TURN and MOVE: the control positions the rotary axes."""
+    """Turn the rotary axes as TURN and MOVE do; `way`: to where, None if that is not known."""
     if control.tcp:
         switch(control, control.tools.vector, False, control.tools.offset)
         control.refresh()
@@ -474,9 +474,9 @@ def turn_axes(control: KlartextControl, way: dict[int, float] | None) -> None:
 
 
 def cycle_19(control: KlartextControl, words: MotionWords) -> None:
-    """Cycle 19: spatial angles, or positions of rotary axes, as a machine parameter says; none ends the tilt.
+    """Cycle 19: tilt by spatial angles or by positions of rotary axes; without angles it ends the tilt.
 
-    Where the axes stand tells which of the two is meant.
+    A machine parameter decides which of the two is meant; here the positions of the axes show it.
     """
     values = {letter: words.values[letter] for letter in "ABC" if letter in words.values}
     if not values and is_idle(control, frozenset()):
@@ -507,7 +507,7 @@ def cycle_19(control: KlartextControl, words: MotionWords) -> None:
 
 
 def check_normal(control: KlartextControl) -> str:
-    """Why a motion in the tilted plane is refused: the tool does not stand normal to it."""
+    """Why a motion in the tilted plane is refused: the tool is not normal to it. Empty if it is not refused."""
     if not control.plane_tilted or control.m128 or TILTED in control.suspended:
         return ""
     return NOT_NORMAL if control.square_to(control.frames.plane.rotation) is False else ""

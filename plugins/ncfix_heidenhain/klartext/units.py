@@ -1,6 +1,6 @@
-"""A Klartext program ready to be followed: the plans of its blocks, its labels, where it begins.
+"""A Klartext program prepared for following it: the plans of its blocks, its labels, and where it begins.
 
-For the fast lane also: which shapes of blocks are nothing but a motion with plain numbers, or a pole.
+Also which shapes of blocks the fast lane can take: those that are nothing but a motion with plain numbers, or a pole.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from ncfix_heidenhain.klartext.plans import LETTERS, KlartextPlan, plan_of
 
 STRAIGHT = frozenset({"", "l"})
 ARCS = {"cr": "R", "c": "", "cp": "IPA"}
-"""Arcs in the plane of X and Y, and the address besides axes that each has."""
+"""Arcs of the fast lane -> the address that each needs besides its axes."""
 
 IDLE = frozenset({"F", "S"})
-"""Addresses that lead nowhere."""
+"""Addresses of a motion block that do not change where it leads: feed and speed."""
 
 SIDES = {"r0": 0, "rl": 41, "rr": 42}
-"""What radius compensation is from a block on."""
+"""Word -> the radius compensation from its block on: 0 off, 41 left, 42 right."""
 
 SENSES = {"dr-": CLOCKWISE, "dr+": COUNTER}
 FLAGS = frozenset({"fmax", *SIDES})
 HARMLESS = frozenset({3, 4, 5, 7, 8, 9, 13, 14})
-"""M codes of spindle and coolant: they change nothing that motions depend on."""
+"""M codes of spindle and coolant, which change nothing that motions depend on."""
 
 NOTHING = Lane((), -1, -1)
 RAPID, FEED = 0, 10
@@ -44,15 +44,15 @@ RAPID, FEED = 0, 10
 
 @frozen
 class KlartextLaneTables:
-    """The shapes of a program as columns.
+    """What the fast lane needs of the s shapes of a program, as columns.
 
     open   (s,) blocks of the shape may go through the fast lane
-    empty  (s,) they do nothing
-    side   (s,) what radius compensation is from them on, -1 if it stays
-    words  axes, feed and motion as in every lane; motion is that of motions; arcs move X and Y
-    arc    (s,) the name of the arc that they make, empty for none
-    value  (s,) which number of a block is R of CR, or IPA of CP; -1
-    pole   (s, 2) which ones are X and Y of a pole (CC); -1
+    empty  (s,) blocks of the shape do nothing
+    side   (s,) radius compensation from the block on; -1 if the block does not change it
+    words  axes, feed and motion code, as in every fast lane; arcs always move X and Y
+    arc    (s,) name of the arc; empty if the block makes none
+    value  (s,) place of R (of CR) or IPA (of CP) among the numbers of the block; -1 without
+    pole   (s, 2) places of X and Y of a pole (CC) among the numbers of the block; -1 without
     """
 
     open: Mask
@@ -65,7 +65,7 @@ class KlartextLaneTables:
 
     @classmethod
     def of(cls, templates: Sequence[Template], plans: Sequence[KlartextPlan], axes: int) -> KlartextLaneTables:
-        """The tables of some shapes; `axes`: bit mask of the letters that the machine has."""
+        """The columns for some shapes; `axes`: bit mask of the axes that the machine has."""
         slots = [slots_of(template, plan) for template, plan in zip(templates, plans, strict=True)]
         lanes = [lane_of(plan, own, axes) for plan, own in zip(plans, slots, strict=True)]
         sides = [max((SIDES[flag] for flag in plan.flags & SIDES.keys()), default=-1) for plan in plans]
@@ -89,14 +89,14 @@ class KlartextLaneTables:
 
 
 def slots_of(template: Template, plan: KlartextPlan) -> Mapping[str, int] | None:
-    """Address -> slot of the words of a motion; None if some are more than plain numbers."""
+    """Address -> slot of its number, for the words of a motion; None if a word is more than a plain number."""
     values = {word.address: word.value for word in template.words if not isinstance(word.value, Constant)}
     slots = {address: value.slot for address, value in values.items() if isinstance(value, Literal) and address != "N"}
     return slots if slots.keys() == plan.words.keys() else None
 
 
 def lane_of(plan: KlartextPlan, slots: Mapping[str, int] | None, axes: int) -> Lane | None:
-    """The fast lane's view of a shape; None if its blocks are more than a motion with plain numbers, or a pole."""
+    """What the fast lane needs of a shape; None if its blocks are neither a motion with plain numbers nor a pole."""
     if plan.empty:
         return NOTHING
     if slots is None or not is_plain(plan):
@@ -117,7 +117,7 @@ def lane_of(plan: KlartextPlan, slots: Mapping[str, int] | None, axes: int) -> L
 
 
 def arc_of(plan: KlartextPlan, slots: Mapping[str, int]) -> Lane | None:
-    """The view of the fast lane of an arc; None if it is not in the plane of X and Y, or lacks what it needs."""
+    """What the fast lane needs of an arc; None if it is not in the plane of X and Y, or lacks a word that it needs."""
     own, named = ARCS[plan.name], slots.keys() & LETTERS
     senses = plan.flags & SENSES.keys()
     if len(senses) != 1 or not plan.flags <= senses | {"r0"} or not slots.keys() <= {"X", "Y", "Z", "F", "S", own}:
@@ -131,7 +131,7 @@ def arc_of(plan: KlartextPlan, slots: Mapping[str, int]) -> Lane | None:
 
 
 def is_plain(plan: KlartextPlan) -> bool:
-    """Whether a block does nothing but what its words with numbers say, and what is harmless."""
+    """Whether a block has only plain words and harmless M codes: no flow, assignment, tool, statement or block skip."""
     if plan.skip or plan.flow or plan.assignments or plan.tool is not None or plan.statement:
         return False
     return not any(code not in HARMLESS or own for code, own in plan.codes)
@@ -144,11 +144,12 @@ MM_PER_UNIT = {"MM": 1.0, "INCH": 25.4}
 
 
 class KlartextUnit(TextUnit[KlartextPlan]):
-    """One program.
+    """One Klartext program.
 
-    axes     bit mask of the letters that the machine has
-    labels   label -> its block, the first of that name
-    mm       mm per unit of length
+    axes    bit mask of the axes that the machine has
+    labels  name of a label -> the first block with that label
+    begin   the block after BEGIN PGM
+    mm      mm per unit of length of the program
     """
 
     def __init__(self, program: Program, axes: int, external: str = "") -> None:
@@ -170,7 +171,7 @@ class KlartextUnit(TextUnit[KlartextPlan]):
         return ~self.lanes.open
 
     def next_plan(self, block: int) -> KlartextPlan | None:
-        """What the first block from there on does that does anything but set a pole."""
+        """The plan of the first block, from `block` on, that does something other than set a pole."""
         plans = map(self.plan, range(block, self.stop))
         return next((plan for plan in plans if not plan.empty and plan.name != "cc"), None)
 
@@ -186,7 +187,7 @@ class KlartextUnit(TextUnit[KlartextPlan]):
         return found
 
     def _beginning(self) -> tuple[int, float]:
-        """The block after BEGIN PGM, and the unit that it names."""
+        """The block after BEGIN PGM, and the mm per unit of length that BEGIN PGM states."""
         statements = [plan.statement for plan in self.all_plans()]
         heads = [i for i, statement in enumerate(statements) if statement is not None and statement[0] == "program"]
         for block in self.blocks_of(heads):

@@ -1,8 +1,8 @@
-"""What Klartext adds to the writer of blocks: path functions and poles, sides of rotary words, and holes.
+"""Writing corrected Klartext blocks: path functions and poles, the limits of rotary words, and holes.
 
-What relies on a pole or on the element before it (LP, CP, CT) is said anew in Cartesian words; arcs are put into words
-by `arc_text`. Cycles of the 200s count their depth from a surface, Q203, which is moved for one hole. The old ones
-count it from where the tool stands, so that gets a word.
+A motion that depends on a pole or on the element before it (LP, CP, CT) is rewritten in Cartesian words; `arc_text`
+writes arcs. Cycles of the 200s count their depth from a surface, Q203: it is moved for one hole and moved back. The old
+cycles count their depth from where the tool stands, so that height is written in the block.
 """
 
 from __future__ import annotations
@@ -25,22 +25,23 @@ from ncfix_heidenhain.klartext.layout import STRAIGHT, TURN_DEGREES, KlartextLay
 from ncfix_heidenhain.klartext.plans import VECTOR
 
 BY_PATH = frozenset({"c", "ct", "ctp", "cp", "lp"})
-"""Functions whose meaning depends on where the tool stands or comes from, or on a pole."""
+"""Path functions whose meaning depends on a pole, or on where the tool comes from."""
 
 SAID_BY_WORDS = ("", "l", "ln", "ct", "ctp")
-"""Functions that are always gone through: by their words alone, or by the direction that they come from."""
+"""Path functions whose words are always compared one by one with what is wanted: `_as_it_is` leaves them out."""
 
 WHICH_POLE = "the arc needs a pole of its own, and which one was in force before it the text does not tell"
 NOT_CLOSED = "the full circle begins at a place that its own words have too few digits to name"
 
 SURFACE = "Q203"
+"""The parameter of cycles of the 200s for the height of the surface."""
 
 UNCORRECTED = 1e-9
-"""Degrees: what an angle is off for nothing but the rounding of doubles."""
+"""Degrees by which an angle may differ through rounding of doubles alone: it counts as not corrected."""
 
 
 def spelling_of(program: Program) -> Spelling:
-    """Numbers with their sign, with a comma where the program has commas. A control takes eight digits of TX TY TZ."""
+    """How numbers are written: signed, with commas if the program has commas, TX TY TZ with 7 decimals."""
     return Spelling(
         signed=True,
         comma=uses_comma(program.source),
@@ -55,8 +56,9 @@ def spelling_of(program: Program) -> Spelling:
 class KlartextWriter(BlockWriter):
     """Writes one motion into one block.
 
-    named     columns of axes that get a word in any case, as those do that polar words stood for
-    own_pole  a pole has been put before the block or one of its pieces
+    in_plane  columns of the two axes of the working plane
+    named     columns of axes that get a word in any case, such as those whose polar words are replaced
+    own_pole  a CC has been written before the block or before one of its pieces
     """
 
     layout: KlartextLayout
@@ -87,7 +89,7 @@ class KlartextWriter(BlockWriter):
                 self.out.lines.append(self.prefix + old_pole)
 
     def _as_it_is(self) -> bool:
-        """The block says well enough what is wanted, and nothing that it relies on has moved."""
+        """Whether the block can stay as it is: it leads where it should, and nothing that it depends on has moved."""
         target, name = self.target, self.layout.name
         if name in SAID_BY_WORDS or name.startswith(("appr", "dep")) or len(target.ends) > 1 or any(target.spelled):
             return False
@@ -110,9 +112,10 @@ class KlartextWriter(BlockWriter):
         return column in self.named or super()._must_name(column)
 
     def _may_add(self, column: int) -> bool:
-        """Not a rotary axis that is not corrected and stands where it should, but for the digits of its last word.
+        """Whether an axis without a word may get one.
 
-        Not the tool axis beside a corner that the control makes, which lies in the working plane, or in a departure.
+        No: a rotary axis that is not corrected and already stands where it should but for rounding, and the tool axis
+        in a departure or beside a corner that the control makes, since that corner lies in the working plane.
         """
         layout = self.layout
         if self._is_rotary(column):
@@ -126,14 +129,14 @@ class KlartextWriter(BlockWriter):
         return bool(self.target.rotary) and self.target.rotary[column]
 
     def _stands(self, column: int) -> bool:
-        """A rotary axis stands where it should in all pieces, but for rounding."""
+        """Whether a rotary axis starts, and stays in all pieces, where it should be but for rounding."""
         target = self.target
         ends, nominal = target.ends[:, column].tolist(), float(target.nominal[column])
         here = abs(ends[0] - float(target.start[column]))
         return here <= ROUNDED * self.half[column] and all(abs(end - nominal) < UNCORRECTED for end in ends)
 
     def _reachable(self, column: int, end: float, piece: int = 0) -> float:
-        """The end of a piece, of a rotary axis on its side of zero and of a full turn."""
+        """The position of an axis at the end of a piece; for a rotary axis as `on_its_side` limits it."""
         target = self.target
         if not self._is_rotary(column) or not np.isfinite(end):
             return end
@@ -150,7 +153,7 @@ class KlartextWriter(BlockWriter):
             self.out.edits.append((*self.program.span(self.block, span), name))
 
     def _motion_code(self) -> None:
-        """What is not straight by its words becomes an L, an approach or departure in polar words a Cartesian one."""
+        """Write the path function of a straight piece: L; approaches and departures keep theirs, in Cartesian form."""
         layout, name = self.layout, self.layout.name
         if name in ("", "l", "ln") and not layout.polar:
             return
@@ -162,13 +165,13 @@ class KlartextWriter(BlockWriter):
             self._remove_span(layout.sense)
 
     def _arc_words(self, start: Array, end: Array) -> None:
-        """Arcs are written by `_first_piece`."""
+        """Nothing: `_first_piece` writes arcs."""
 
     def _opening(self, wanted: int) -> list[str]:
         return ["LN" if self.layout.vector else "L"]
 
     def _direction_words(self, end: Array) -> list[str]:
-        """TX TY TZ of a further piece; its normal is that of the block."""
+        """The words NX NY NZ of the block, and TX TY TZ of a further piece."""
         normals = [w for w in self.program.items_of(self.block) if isinstance(w, Word) and w.address[0] == "N"]
         words = [self.program.slice(self.block, word.span) for word in normals if len(word.address) == 2]
         return words + super()._direction_words(end)
@@ -176,7 +179,7 @@ class KlartextWriter(BlockWriter):
     # -- arcs ---------------------------------------------------------------------------------------------------------
 
     def _first_piece(self, position: Array, end: Array) -> Array:
-        """The block itself, if it is an arc: in the words and with the pole that it needs."""
+        """Write the first piece into the block; an arc as C, CR or CP, with a CC before it where it needs one."""
         target, layout = self.target, self.layout
         if not target.arc:
             return super()._first_piece(position, end)
@@ -247,7 +250,7 @@ class KlartextWriter(BlockWriter):
         )
 
     def _as_written(self, begin: Array, end: Array, *, own: bool) -> Array:
-        """An end on the digits that will be written; `own`: by the words of the block itself."""
+        """The end of a piece, rounded to the digits that will be written; `own`: the words of the block are used."""
         result, decimals = end.tolist(), self.target.decimals.tolist()
         for column, letter in self.columns:
             word = self.layout.axes.get(letter) if own else None
@@ -261,7 +264,7 @@ class KlartextWriter(BlockWriter):
         return np.array(result)
 
     def _radius(self, arc: ArcText) -> None:
-        """The R word of CR."""
+        """Write the word R of a CR; remove it for other arcs."""
         word = self.layout.radius
         if arc.function != "CR":
             self._remove(word)
@@ -276,7 +279,7 @@ class KlartextWriter(BlockWriter):
         return "CC" + "".join(self.layout.blank + text for text in arc.pole)
 
     def _old_pole(self) -> str | None:
-        """The pole that was in force, which later blocks may rely on; empty if there was none, None if nobody knows."""
+        """The CC that sets the pole which was in force again; empty without such a pole, None if it is not known."""
         target = self.target
         if self.layout.name not in ("c", "cp"):
             words = pole_in_force(self.program.source, int(self.program.blocks[self.block, 0]))
@@ -295,7 +298,7 @@ class KlartextWriter(BlockWriter):
     # -- holes --------------------------------------------------------------------------------------------------------
 
     def _over_the_hole(self) -> None:
-        """The position over a hole, and its depth."""
+        """Write the position over a hole, and correct its depth."""
         target, called = self.target, self.layout.name == "cycl call"
         across, position = target.spatial[2], target.start.copy()
         rotary = [column for column, _ in self.columns if called and self._is_rotary(column)]
@@ -312,10 +315,10 @@ class KlartextWriter(BlockWriter):
         self.out.ends.append(position)
 
     def _sunk(self, off: float, across: int) -> float:
-        """Move the surface from which the cycle counts its depth, for this hole only; by how much.
+        """Move the surface from which the cycle counts its depth, for this hole only; returns by how much, mm.
 
-        A change of Q203 itself counts for the calls that follow (TNC 640, "Cycle programming": define the parameter of
-        the cycle directly). It is taken back after the block, so other holes and formulas find the value they knew.
+        A new value of Q203 takes effect at the next call of the cycle (TNC 640, "Cycle programming": define the
+        parameter of the cycle directly). After the block the old value is restored for other holes and for formulas.
         """
         if abs(off) < self.half[across] or SURFACE in self.program.text_of(self.block):
             return 0.0
@@ -325,9 +328,10 @@ class KlartextWriter(BlockWriter):
         return value_of(text)
 
     def _lifted(self, off: float, across: int) -> float:
-        """Call an old cycle from a height that makes its depth right; by how much that is another height.
+        """Call an old cycle from a height that makes its depth right; returns by how much the height changes.
 
-        Without a word the height is that of the hole before, which had its own; so it is said each time.
+        A block without Z would start from the height of the hole before, which was corrected for that hole. So Z is
+        written for each hole.
         """
         word, decimals = self.layout.axes.get("Z"), int(self.target.decimals[across])
         if word is None:
@@ -340,15 +344,16 @@ class KlartextWriter(BlockWriter):
 
 
 # -- rotary words -----------------------------------------------------------------------------------------------------
-# A table that counts below 360 degrees takes -0.001 for 359.999, and the next word may then lead it the long way round.
-# So a program that never writes such an angle does not get one from a correction either: the word stays at the limit,
-# and the linear axes are those of that angle (`WrittenLanguage.held_angle`). The direction of the tool is off by the
-# rest. Rotary words are corrected under `--strategy full` only.
+# A rotary table that counts from 0 to 360 degrees takes -0.001 as 359.999, and may then turn the long way round to the
+# next word. So where a program never writes an angle below zero (or of a full turn and more), a correction does not
+# write one either. The angle stays at the limit, the linear axes are worked out for that angle
+# (`WrittenLanguage.held_angle`), and the direction of the tool keeps the rest of its error. Rotary words are corrected
+# under `--strategy full` only.
 
 
 @lru_cache(maxsize=16)
 def extremes(source: bytes, letter: str) -> tuple[float, float]:
-    """The smallest and largest angle that a program writes for a rotary axis, degrees; 0 at least is among them."""
+    """The smallest and the largest angle that a program writes for a rotary axis, degrees; both 0 if it writes none."""
     code = re.sub(rb";[^\r\n]*", b"", source)
     found = re.findall(rb"(?i)(?<![A-Z0-9])" + letter.encode() + rb"[ \t]*([+-]?[ \t]*[\d.,]*\d)", code)
     angles = [value_of(text) for text in map(bytes.decode, found) if text.count(".") + text.count(",") < 2]
@@ -356,7 +361,10 @@ def extremes(source: bytes, letter: str) -> tuple[float, float]:
 
 
 def on_its_side(source: bytes, letter: str, nominal: float, angle: float, step: float) -> float:
-    """A corrected angle, degrees; not below zero or past a full turn where the program never is. `step`: one digit."""
+    """A corrected angle, degrees, held at 0 or just below 360 where the program itself never goes beyond.
+
+    step  the smallest change that the digits of the word can express, degrees
+    """
     if abs(angle - nominal) < UNCORRECTED:
         return angle
     if nominal >= 0.0 > angle and extremes(source, letter)[0] >= 0.0:
