@@ -1,8 +1,10 @@
-"""An arc put into words: CR where its radius says well enough where its centre is, C about a pole of its own where it
-does not (near a half circle, and full circles), CP for helices and for more than one turn.
+"""Writing an arc in words, and which pole is in force at a block.
 
-The pole that is in force at a block, as the text shows it, and whether blocks after it rely on it: what has to come
-back after an arc that is written about a pole of its own.
+An arc is written as CR where the radius fixes its centre well enough. Near a half circle, and for full circles, it does
+not: there the arc is written as C, after a CC of its own. Helices, and arcs of more than a turn, are written as CP.
+
+After a CC of its own, the pole that was in force has to be restored if later blocks rely on it. Both are found in the
+text of the program.
 """
 
 from __future__ import annotations
@@ -19,10 +21,10 @@ from ncfix.control.arcs import sweep_angle
 from ncfix.text.spelling import Spelling, value_of
 
 POLE_DIGITS, ANGLE_DIGITS = 4, 4
-"""What a control takes after the point of a coordinate, and of an angle (TNC 640, "Technical information")."""
+"""Decimals that a control accepts of a coordinate, and of an angle (TNC 640, "Technical information")."""
 
-ASIDE = 1e-4
-"""How far (in program units) an arc may pass beside its place so that an angle of so many digits leads to its end."""
+MAX_ASIDE = 1e-4
+"""How far an arc may pass beside its place, program units, so that an angle of `ANGLE_DIGITS` leads to its end."""
 
 LEAST_FULL_TURN = 2 * math.pi - 1e-6
 
@@ -32,11 +34,10 @@ LINE = re.compile(
     rf"CC[ \t]+(?P<words>[XYZ]{NUMBER}[ \t]*[XYZ]{NUMBER})[ \t]*(?:;.*)?\r?$"
     rf"|(?:CC(?![A-Z])|LBL|[^;\r\n]*(?:CALL|M99|M98|M89)))".encode("latin-1")
 )
-"""A pole in plain numbers, or what may set another one or be reached from elsewhere."""
-
+"""A CC in plain numbers (`words`); or a line after which the pole may be another: other CC, labels, calls, cycles."""
 
 NUMBERED = r"(?i)\n[ \t]*/?[ \t]*\d*[ \t]*(?=[CLADFIE])(?!L[ \t])"
-"""The beginning of a line, behind the end of the one before; most lines are told apart from those that matter here."""
+"""The beginning of a line, with its block number; by their first letter it leaves out most lines, as L."""
 
 SETS = re.compile(rb"(?i)CC[ \t]*(?:[;~\r\n]|\Z|I?[XYZ][^;\r\nXYZ]*I?[XYZ])|END[ \t]+PGM")
 EVENT = re.compile(
@@ -44,26 +45,26 @@ EVENT = re.compile(
         NUMBERED + r"(?P<what>CC?(?![A-Z])|LP|CP|CTP|(?:APPR|DEP)[ \t]+P|CALL|FN|IF|LBL[ \t]*0(?!\d)|END[ \t]+PGM)"
     ).encode()
 )
-"""What sets a pole, relies on one, or may lead elsewhere; other labels are passed through."""
+"""Lines that set a pole, rely on one, or may lead elsewhere; of labels only LBL 0 does."""
 
 USES = re.compile(rb"(?im)^[ \t/\d]*(?:CP?|LP|CTP)(?![A-Z])|(?:APPR|DEP)[ \t]+P|CALL[ \t]+(?:PGM|SEL)|PGM[ \t]+CALL")
-"""What counts from a pole, and calls of other programs, which may: without any a text relies on none."""
+"""Blocks that rely on a pole, and calls of other programs, which may: a text without any relies on none."""
 
 CALCULATION = re.compile(rb"(?i)FN[ \t]*(?!9|1[0-2])\d")
-LOOK = 80
-"""Bytes of a line that tell what it is."""
+LOOK_BYTES = 80
+"""The number of bytes of a line that are read to tell what it is."""
 
 
 class PieceOfArc(NamedTuple):
-    """One arc, in program numbers.
+    """One arc, in program units.
 
     begin, end  (n_axes,) positions
-    centre      (3,) of X Y Z
-    plane       its two axes and the one across, as indices of X Y Z
-    spatial     columns of X Y Z
-    clockwise   its sense
-    turn        the angle that it was meant to have, rad, where that may be more than a turn; else None
-    decimals    (n_axes,) digits after the point
+    centre      (3,) X Y Z of the centre
+    plane       the two axes of its plane and the one across, as indices of X Y Z
+    spatial     columns of X Y Z among the axes
+    clockwise   sense of rotation
+    turn        the angle in the program, rad, where it may be more than a turn; else None
+    decimals    (n_axes,) decimals of each axis
     """
 
     begin: Array
@@ -77,19 +78,19 @@ class PieceOfArc(NamedTuple):
 
     @property
     def columns(self) -> list[int]:
-        """The columns of the axes of its plane."""
+        """The columns of the two axes of its plane."""
         return [self.spatial[index] for index in self.plane[:2]]
 
 
 class ArcText(NamedTuple):
-    """An arc in words.
+    """The words of an arc, and the arc that they mean.
 
     function  CR, C or CP
     pole      the words of the CC before it; empty for CR
-    words     R, or IPA
+    words     the word R of CR or IPA of CP; empty for C
     sense     DR+ or DR-
-    end       (n_axes,) where it ends: of CP as the control works it out
-    centre    (3,) about what
+    end       (n_axes,) end; that of CP as the control works it out
+    centre    (3,) X Y Z of the centre
     """
 
     function: str
@@ -101,7 +102,7 @@ class ArcText(NamedTuple):
 
 
 class InPlane(NamedTuple):
-    """An arc in its plane, points as complex numbers: begin, end, about what, its sense, digits, `PieceOfArc.turn`."""
+    """An arc in its plane, with points as complex numbers; `middle` is its centre, `turn` as in `PieceOfArc`."""
 
     begin: complex
     end: complex
@@ -112,7 +113,7 @@ class InPlane(NamedTuple):
 
 
 def arc_text(arc: PieceOfArc, style: Spelling) -> ArcText:
-    """Put an arc into words."""
+    """The words of an arc."""
     columns, across = arc.columns, arc.spatial[arc.plane[2]]
     begin, end, middle = (
         complex(*each) for each in (arc.begin[columns], arc.end[columns], arc.centre[[*arc.plane[:2]]])
@@ -134,13 +135,13 @@ def arc_text(arc: PieceOfArc, style: Spelling) -> ArcText:
 
 
 def swept(arc: InPlane, middle: complex) -> float:
-    """The signed angle, rad, from begin to end about a centre, at most a turn."""
+    """The signed angle, rad, from the begin of an arc to its end about a centre; at most a turn."""
     to_centre, to_end = middle - arc.begin, arc.end - arc.begin
     return sweep_angle((to_centre.real, to_centre.imag), (to_end.real, to_end.imag), 1, clockwise=arc.clockwise)
 
 
 def by_radius(arc: InPlane, style: Spelling) -> tuple[str, complex] | None:
-    """R as written, and the centre that it means; None if that is over an output step from where it belongs."""
+    """The text of R, and the centre that it means; None if that is more than an output step from the wanted one."""
     way, wanted = arc.end - arc.begin, arc.middle
     size = (abs(wanted - arc.begin) + abs(wanted - arc.end)) / 2
     sign = 1.0 if abs(swept(arc, wanted)) <= math.pi else -1.0
@@ -155,12 +156,12 @@ def by_radius(arc: InPlane, style: Spelling) -> tuple[str, complex] | None:
 
 
 def pole_text(middle: complex, style: Spelling, digits: int) -> tuple[str, str]:
-    """The coordinates of a pole as they are written."""
+    """The texts of the two coordinates of a pole."""
     return style.number(middle.real, digits), style.number(middle.imag, digits)
 
 
 def point_of(texts: tuple[str, str]) -> complex:
-    """What coordinates say."""
+    """The point that two texts of coordinates mean."""
     return complex(value_of(texts[0]), value_of(texts[1]))
 
 
@@ -170,16 +171,17 @@ def pole_words(plane: tuple[int, int, int], texts: tuple[str, str]) -> tuple[str
 
 
 def helix(arc: InPlane, style: Spelling) -> tuple[tuple[str, str], str, complex]:
-    """CP: a pole that is about equally far from both ends, IPA, and the end that the control works out of these.
+    """CP: the texts of a pole about equally far from both ends, the text of IPA, and the end that results from them.
 
-    The angle is put on its digits before the pole is: about a far one that leads nearer to the end. About a near one
-    it is better found again from the pole as it is written.
+    There are two ways to the angle. It may be rounded first, and the pole chosen for the rounded angle: about a far
+    pole this leads nearer to the end. Or it is measured about the pole as written: that is better about a near one.
+    The one that leads nearer to the end is taken.
     """
     wanted = between(arc, turned_by(arc, arc.middle))
     first = on_digits(turned_by(arc, wanted), style)
     angle = math.radians(value_of(first))
     fitting = seen_under(arc, angle)
-    if abs(wanted - fitting) * (1 - math.cos(angle / 2)) < ASIDE:
+    if abs(wanted - fitting) * (1 - math.cos(angle / 2)) < MAX_ASIDE:
         wanted = fitting
     texts = pole_text(wanted, style, max(POLE_DIGITS, arc.digits))
     pole = point_of(texts)
@@ -190,19 +192,21 @@ def helix(arc: InPlane, style: Spelling) -> tuple[tuple[str, str], str, complex]
 
 
 def turned_by(arc: InPlane, middle: complex) -> float:
-    """As `swept`, with the whole turns that the arc was meant to have."""
+    """As `swept`, plus the whole turns that the arc has in the program."""
     angle = swept(arc, middle)
     return angle if arc.turn is None else angle + 2 * math.pi * round((arc.turn - angle) / (2 * math.pi))
 
 
 def on_digits(angle: float, style: Spelling) -> str:
-    """An angle as the control takes it."""
+    """The text of an angle, rad, in degrees with the decimals that the control accepts."""
     return style.number(math.degrees(angle), ANGLE_DIGITS)
 
 
 def between(arc: InPlane, angle: float) -> complex:
-    """The centre that is equally far from both ends; of nearly full circles, where rounded ends are equally far only
-    from a place far aside, a centre on the way there, so that the rest of the arc suffers no more than its end.
+    """The point near the centre that is equally far from both ends, or a point on the way there.
+
+    On a nearly full circle, rounded ends are equally far only from a point that is far aside. There it goes only part
+    of the way, so that the error along the arc is no larger than the error at its end.
     """
     goal = equally_far(arc)
     aside = abs(goal - arc.middle)
@@ -214,7 +218,7 @@ def between(arc: InPlane, angle: float) -> complex:
 
 
 def equally_far(arc: InPlane) -> complex:
-    """The point next to the centre that is equally far from begin and end; of full turns any is."""
+    """The point nearest to the centre that is equally far from begin and end; the centre itself if these coincide."""
     way = arc.end - arc.begin
     if abs(way) < 1e-6:
         return arc.middle
@@ -223,7 +227,7 @@ def equally_far(arc: InPlane) -> complex:
 
 
 def seen_under(arc: InPlane, angle: float) -> complex:
-    """The point from which the way from begin to end is seen under an angle, rad; infinitely far for none."""
+    """The centre about which begin and end are an angle (rad) apart; infinitely far away for the angle 0."""
     half = math.tan(angle / 2)
     if abs(half) < 1e-12:
         return complex(math.inf, math.inf)
@@ -231,7 +235,7 @@ def seen_under(arc: InPlane, angle: float) -> complex:
 
 
 def spatial(arc: PieceOfArc, middle: complex) -> Array:
-    """A centre in the plane as one of X Y Z, (3,); across the plane it lies where the arc begins."""
+    """X Y Z of a centre in the plane, (3,); across the plane it is where the arc begins."""
     found = arc.centre.copy()
     found[arc.plane[0]], found[arc.plane[1]] = middle.real, middle.imag
     across = arc.spatial[arc.plane[2]]
@@ -244,12 +248,12 @@ def spatial(arc: PieceOfArc, middle: complex) -> Array:
 
 
 def in_lines(source: bytes) -> bytes:
-    """A text with a line feed for every carriage return, which may stand alone: every byte is where it was."""
+    """A text whose carriage returns, which may stand alone, are line feeds; every byte keeps its place."""
     return source.replace(b"\r", b"\n")
 
 
 def is_relied_on(source: bytes, after: int) -> bool:
-    """Whether what follows a byte of the program may rely on the pole that is in force there."""
+    """Whether blocks after a byte of the program may rely on the pole that is in force there."""
     places, relying = _events(source)
     index = bisect_left(places, after)
     return index < len(places) and relying[index]
@@ -263,11 +267,11 @@ def relies_at_once(source: bytes) -> bool:
 
 @lru_cache(maxsize=4)
 def _events(source: bytes) -> tuple[list[int], list[bool]]:
-    """Where a pole is set or something may rely on one, and which of the two it is."""
+    """The bytes at which a pole is set or may be relied on, and for each whether it is relied on."""
     places, relying = [], []
     text = b"\n" + in_lines(source)
     for found in EVENT.finditer(text) if USES.search(text) else ():
-        line = text[found.start("what") : found.start("what") + LOOK]
+        line = text[found.start("what") : found.start("what") + LOOK_BYTES]
         if CALCULATION.match(line) is None:
             places.append(found.start())
             relying.append(SETS.match(line) is None)
@@ -275,7 +279,7 @@ def _events(source: bytes) -> tuple[list[int], list[bool]]:
 
 
 def pole_in_force(source: bytes, at: int) -> str | None:
-    """The words of the last CC before a byte of the program: empty if there is none, None if the text does not tell."""
+    """The words of the last CC before a byte of the program; empty if there is none, None if the text does not tell."""
     places, words = _poles(source)
     index = bisect_left(places, at) - 1
     return words[index] if index >= 0 else ""

@@ -1,9 +1,8 @@
-"""Circular motions: C, CR, CP, CT and CTP.
+"""Circular motions: C, CR, CP, CT and CTP; and `Step`, the motion block that is being executed.
 
-Source: TNC 640, "Programming: contours". The sense of rotation counts in the program's frame; in a mirrored frame it
-turns round, as on the control.
+The sense of rotation counts in the program's frame; mirroring reverses it, as on the control.
 
-A step is one motion block while it is executed, and what all path functions do with it.
+Source: TNC 640, "Programming: contours".
 """
 
 from __future__ import annotations
@@ -32,16 +31,17 @@ from ncfix_heidenhain.klartext.targets import (
 )
 
 IN_PLANE = 1 << X | 1 << Y
+"""The bits of X and Y."""
 
 
 @frozen
 class Step:
-    """One motion block while it is executed.
+    """The motion block that is being executed.
 
-    name    its path function
-    words   its words
-    flags   `fmax`, `dr+`, ...
-    codes   its M codes
+    name    path function
+    words   words with their values
+    flags   words without values: `fmax`, `dr+`, ...
+    codes   M codes
     """
 
     name: str
@@ -51,12 +51,12 @@ class Step:
 
     @property
     def kind(self) -> MotionKind:
-        """At FMAX a rapid."""
+        """A rapid with FMAX, else a feed motion."""
         return MotionKind.RAPID if "fmax" in self.flags else MotionKind.FEED
 
 
 def somewhere(control: KlartextControl, axes: int, end: MotionEnd, reason: str) -> None:
-    """A refused curve that ends nobody knows where: the motion before it must still end where it did."""
+    """Make a refused arc of unknown shape: the motion before must still end exactly where the program says."""
     normal = control.rotation[0][2], control.rotation[1][2], control.rotation[2][2]
     control.modal.arc_absolute = True
     nowhere = Arc((0.0, 0.0, 0.0), normal, 0.0)
@@ -71,10 +71,11 @@ NO_TANGENT = "a tangential arc (CT), and the element before leaves no direction 
 NO_ANGLE = "CP without an angle (PA, IPA): whether the control makes a full circle of it or stops is not sure"
 AROUND = "an arc about a pole (CC) that was set before the datum was moved: where it lies is not sure"
 FLAT = 1e-9
+"""A length, mm, below which there is no direction; also the least sine of the angle by which CT turns away."""
 
 
 def circular(control: KlartextControl, step: Step) -> None:
-    """C: about the pole to an end point."""
+    """C: an arc about the pole to an end point."""
     pole = known_pole(control)
     plane, clockwise = control.path.plane, is_clockwise(step)
     control.use()
@@ -95,7 +96,7 @@ def circular(control: KlartextControl, step: Step) -> None:
 
 
 def circular_by_radius(control: KlartextControl, step: Step) -> None:
-    """CR."""
+    """CR: an arc of a given radius to an end point."""
     clockwise = is_clockwise(step)
     control.use()
     where = programmed_position(control, step.words)
@@ -114,7 +115,7 @@ def circular_by_radius(control: KlartextControl, step: Step) -> None:
 
 
 def circular_polar(control: KlartextControl, step: Step) -> None:
-    """CP: about the pole to a polar angle; several turns, and a height, make a helix."""
+    """CP: an arc about the pole to a polar angle, or a helix with several turns and a height."""
     pole = known_pole(control)
     plane, clockwise = control.path.plane, is_clockwise(step)
     control.use()
@@ -138,7 +139,7 @@ def circular_polar(control: KlartextControl, step: Step) -> None:
 
 
 def tangential(control: KlartextControl, step: Step) -> None:
-    """CT and CTP: an arc that goes on in the direction of the element before."""
+    """CT and CTP: an arc that starts in the direction in which the element before ended."""
     control.use()
     where = polar(control, step.words)[0] if step.name == "ctp" else programmed_position(control, step.words)
     if give_up(control, step, where):
@@ -163,7 +164,11 @@ def tangential(control: KlartextControl, step: Step) -> None:
 def swing(
     control: KlartextControl, step: Step, where: FramePosition, plane: Plane, centre: Point, sweep: float
 ) -> None:
-    """The arc itself; its centre from its start, mm along the axes of the plane, and its signed sweep, rad."""
+    """Make an arc.
+
+    centre  from the start, mm along the axes of the plane
+    sweep   signed angle, rad
+    """
     axes = step.words.axes | plane.axes
     end = command_of(control, where, axes)
     arc = control.circle(plane, centre, control.handedness * sweep)._replace(fixed=step.name == "c")
@@ -185,33 +190,33 @@ def direction_at_end(end: Vector, arc: Arc) -> tuple[float, float, float]:
 
 
 def is_clockwise(step: Step) -> bool:
-    """DR-, not DR+."""
+    """Whether an arc has DR-, not DR+; one of them is needed."""
     if not step.flags & {"dr-", "dr+"}:
         raise Fault(BAD_ARC, f"{step.name.upper()} needs DR+ or DR-, the sense of rotation")
     return "dr-" in step.flags
 
 
 def known_pole(control: KlartextControl) -> tuple[float, float]:
-    """The pole."""
+    """The pole in force; a `Fault` if none is known."""
     if control.path.pole is None:
         raise Fault(BAD_POLE, "an arc about the pole, and no pole (CC) is known")
     return control.path.pole
 
 
 def plane_of(words: MotionWords) -> Plane:
-    """The plane of an arc that has no pole: that of its words, else the working plane."""
+    """The plane of an arc without a pole: that of the two axes that its words name, else X and Y."""
     named = frozenset(i for i in range(3) if words.axes >> i & 1)
     return PLANE_OF.get(named, PLANE_OF[frozenset((0, 1))])
 
 
 def start_and_way(control: KlartextControl, where: FramePosition, plane: Plane) -> tuple[Point, Point]:
-    """The start of a motion, and the way from there to its end, along the axes of a plane, mm."""
+    """The start of a motion, and the way from it to the end, mm along the axes of a plane."""
     start, end = plane.of(here(control).inner), plane.of(where.inner)
     return start, (end[0] - start[0], end[1] - start[1])
 
 
 def give_up(control: KlartextControl, step: Step, where: FramePosition) -> bool:
-    """Refuse an arc of which an end is not known; True if that is so."""
+    """Refuse an arc whose start or end is not known; True if it was refused."""
     if not starts_unknown(control) and not where.unknown and not step.words.unknown:
         return False
     reasons = [why.format(LETTERS[i]) for i, why in {**control.unknown, **where.unknown}.items()]
@@ -224,9 +229,9 @@ def give_up(control: KlartextControl, step: Step, where: FramePosition) -> bool:
 
 
 def do_without(control: KlartextControl, step: Step, where: FramePosition, reason: str) -> None:
-    """An arc that is not followed but for its end: one that the control would not accept either, or one not known.
+    """Refuse an arc, and stand at its end: the control would not accept it either, or its shape is not known.
 
-    Of CT the motion before stays, too: a word of an axis more would give it a direction to go on in.
+    Before CT, CP and CTP the motion before must stay as it is, too: CT goes on in its direction.
     """
     about_pole = step.name in ("cp", "ctp")
     axes = polar_axes(control, step.words) if about_pole else step.words.axes or 3

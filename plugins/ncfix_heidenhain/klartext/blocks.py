@@ -1,9 +1,7 @@
-"""One block of Klartext by the grammar: from its text to the template of its shape.
+"""Reading Klartext: the blocks of a text, with lines that `~` joins; their shapes; and the template of each shape.
 
-A block that is not Klartext is no fault of the file: the control loads it, marks the block as ERROR and stops when it
-gets there. It is kept as opaque text of the kind `UNREAD`.
-
-The shapes of a text: lines joined by `~`, decimal points or commas. Lines that the grammar does not know are kept.
+A block that is not Klartext does not make the file faulty: the control loads it, marks the block as ERROR, and stops
+when it gets there. So it is kept as opaque text of the kind `UNREAD`.
 """
 
 from __future__ import annotations
@@ -56,23 +54,23 @@ if TYPE_CHECKING:
 
 COMMENT = re.compile(rb";[^\r\n]*")
 JOINED = re.compile(rb"~[ \t]*(?=\r*\n)")
-"""The mark at the end of a line that the next line continues."""
+"""The mark at the end of a line that continues in the next line."""
 
 FIXED = table(b"QqRrMmNn")
-"""A number after these belongs to the shape, or may: `Q5`, `R0`, `M3`; the grammar is asked for each such shape."""
+"""Letters after which a number belongs, or may belong, to the shape (`Q5`, `R0`, `M3`); the grammar decides."""
 
 WITHIN_NONE = ODD | table(b"\x0b")
-"""What no block with a shape holds: line ends, too."""
+"""Bytes that no block with a shape contains; line ends within a block are among them."""
 
-SMALL = 1 << 14
-"""Bytes of text that are not parted any more to find the block in it that has no shape."""
+SMALL_BYTES = 1 << 14
+"""A text of up to so many bytes is not halved any more to set apart the blocks that have no shape."""
 
 COMMAS = bytes.maketrans(b",\n", b".\x0b")
-"""Decimal commas as points, and line ends within a block as blanks: for the scan only, which counts bytes."""
+"""For the scan only: decimal commas become points, and line feeds vertical tabs; every byte keeps its place."""
 
 
 def split(source: bytes) -> Ints:
-    """Start and stop byte of each block, shape (n, 2): lines, with those that `~` continues joined."""
+    """Start and stop byte of each block, shape (n, 2); lines that `~` joins are one block."""
     lines = split_blocks(source)
     marks = np.array([match.start() for match in JOINED.finditer(source)], dtype=np.int64)
     if not len(marks):
@@ -85,19 +83,19 @@ def split(source: bytes) -> Ints:
 
 
 def scan(source: bytes, blocks: Ints) -> Scan:
-    """Find the numbers and the shape of every block. A block of several lines has none: it is taken as it is."""
+    """Find the numbers and the shape of every block; a block of several lines has no shape, and is read by itself."""
     if core.engaged():
         text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
         found = scan_compiled(text, blocks, False, b";", FIXED, WITHIN_NONE)
         if found is not None:
             return found.setting_apart(misnumbered(text, blocks, found))
-        if len(source) > SMALL and len(blocks) > 1:
+        if len(source) > SMALL_BYTES and len(blocks) > 1:
             return in_halves(source, blocks)
     return in_slices(source, blocks, scan_plain)
 
 
 def in_halves(source: bytes, blocks: Ints) -> Scan:
-    """As `scan`, where some block has to be taken as it is: the others need not be."""
+    """As `scan`, for each half of a text in which some block has no shape, so that the other half is scanned fast."""
     middle = len(blocks) // 2
     at = int(blocks[middle, 0])
     return Scan.joined([(0, scan(source[:at], blocks[:middle])), (at, scan(source[at:], blocks[middle:] - at))])
@@ -120,7 +118,7 @@ def scan_plain(source: bytes, blocks: Ints) -> Scan:
 
 
 def misnumbered(text: Bytes, blocks: Ints, found: Scan) -> list[int]:
-    """The blocks that begin with a number that is no block number: it has a sign or a point."""
+    """The blocks that begin with a number that is no block number, because it has a sign or a point."""
     rows = np.flatnonzero(np.diff(found.first_number))
     spans, begins = found.spans[found.first_number[rows]], blocks[rows, 0]
     points = np.append(np.flatnonzero(text == POINT), len(text))
@@ -132,22 +130,22 @@ def misnumbered(text: Bytes, blocks: Ints, found: Scan) -> list[int]:
 
 
 def inside(blocks: Ints, places: Ints) -> Mask:
-    """Which places stand inside a block."""
+    """(n,) whether places, in bytes, are inside a block."""
     return places < blocks[block_of(blocks, places), 1]
 
 
 BEFORE_NUMBERS = b" \t\x0b\x0c\xa0/"
 BEFORE_NUMBER = table(BEFORE_NUMBERS)
-"""What may stand before a block number: blanks, and the mark of a block that may be skipped."""
+"""Bytes that may stand before a block number: blanks, and the mark of block skip."""
 
 # -- block numbers: nothing refers to them, jumps go to labels ---------------------------------------------------------
 
 NUMBERED = re.compile(rb"(?P<skip>[ \t]*/)?[ \t]*(?:\d+(?![\d.,])[ \t]*)?")
-"""The block number, block skip before it, and blanks."""
+"""The beginning of a block: block skip, block number, and blanks."""
 
 
 def renumbered(source: bytes) -> bytes:
-    """A program with its blocks numbered from 0; the lines that `~` joins are one block, empty lines none."""
+    """A program with its blocks numbered from 0; lines that `~` joins are one block, empty lines are not numbered."""
     pieces, done, count = [], 0, 0
     for start, stop in split(source).tolist():
         if not source[start:stop].strip():
@@ -180,9 +178,9 @@ FRAME = re.compile(
 
 
 def unread_line(control: KlartextControl, text: str) -> None:
-    """A line that could not be read is reached; raises `Fault` if the program may go on elsewhere.
+    """Execute a line that could not be read; raises `Fault` if it may decide where the program goes on.
 
-    Lines that look like blocks of their own behind a remark with `~` may be that.
+    After a remark with `~` the next lines may be part of the remark or blocks of their own, so they are checked, too.
     """
     behind = [line for line in text.split("\n")[1:] if BLOCK_BEHIND.match(f"\n{line}")]
     if any(FLOW.match(each) for each in (text, *behind)):
@@ -198,28 +196,28 @@ def unread_line(control: KlartextControl, text: str) -> None:
 
 
 NUMBERS = frozenset({"NUMBER", "BLOCK_NUMBER"})
-"""The terminals whose text is a number of the block; every other digit belongs to its shape."""
+"""Terminals whose text is a number of the block; all other digits belong to its shape."""
 
 WHOLE = re.compile(r"(?P<number>[ \t]*(?:/[ \t]*)?\d+)?[ \t]*(?P<text>[;*].*)?\Z", re.DOTALL)
-"""A block that is a comment or a structuring remark, with what `~` continues, or nothing at all."""
+"""A block that is only a comment or a structuring remark (with lines that `~` joins), or empty."""
 
 BLOCK_BEHIND = re.compile(
     r"\n[ \t]*(?:/?[ \t]*\d+[ \t]+[A-Z]"
     r"|(?:L|LN|LP|CC?|CP|CR|CTP?|RND|CHF|APPR|DEP|CALL|LBL|TOOL|CYCL|PLANE|STOP)[ \t])",
     re.IGNORECASE,
 )
-"""A line behind a remark that looks like a block of its own: whether `~` makes it part of the remark nobody says."""
+"""A line, after a remark with `~`, that looks like a block: no manual says whether it is part of the remark."""
 
 BLANKED = re.compile(r'"[^"\n]*"|;[^\n]*|~(?=[ \t\r]*(?:\n|\Z))')
-"""Strings, which are left alone, and what counts as blank: comments, and `~` at the end of a line."""
+"""Strings, which stay; and what is read as blanks: comments, and `~` at the end of a line."""
 
 BLANKS = re.compile(r"\s+")
 VALUES = frozenset({"literal", "parameter", "unary"})
-"""The rules that a value without an address is made by."""
+"""Grammar rules of a value without an address."""
 
 
 def parse_block(dialect: Dialect, text: str) -> Parsed:
-    """One block, by the grammar; what is not Klartext, or nested too deep, is opaque."""
+    """Read one block by the grammar; one that is not Klartext, or nested too deep, becomes opaque text."""
     remark = WHOLE.match(text)
     if remark is not None:
         return unread_block() if BLOCK_BEHIND.search(text) else remark_block(text, remark)
@@ -237,7 +235,7 @@ def unread_block() -> Parsed:
 
 
 def remark_block(text: str, match: re.Match[str]) -> Parsed:
-    """A block of nothing but a comment, `; ...`, or a structuring remark, `* - ...`."""
+    """A block that is only a comment, `; ...`, or a structuring remark, `* - ...`."""
     spans: tuple[tuple[int, int], ...] = ()
     values: tuple[float, ...] = ()
     number = re.search(r"\d+", match["number"] or "")
@@ -260,12 +258,12 @@ def remark_block(text: str, match: re.Match[str]) -> Parsed:
 
 
 def identity(text: str) -> UnspacedBlock:
-    """A block of which nothing was taken out."""
+    """The text of a block from which no blanks were taken out."""
     return UnspacedBlock(text, list(range(len(text))))
 
 
 def built(tree: Branch, text: str) -> Parsed:
-    """Make the template of a block from its tree."""
+    """A block with the template that its parse tree stands for."""
     tokens = [token for token in tokens_of(tree) if kind(token) in NUMBERS]
     spans = tuple(edges(token) for token in tokens)
     slots = {span: slot for slot, span in enumerate(spans)}
@@ -284,7 +282,7 @@ def built(tree: Branch, text: str) -> Parsed:
 
 
 def is_twice(items: list[Item]) -> bool:
-    """Whether a block says twice where an axis goes, or how its arc lies: the control marks it as an error."""
+    """Whether a block has two words for the same axis or size, which the control marks as an error."""
     owned = owners(items)
     words = [w.address.removeprefix("I") for k, w in enumerate(items) if isinstance(w, Word) and k not in owned]
     once = [address for address in words if address in MOVING or address in SIZES]
@@ -298,7 +296,7 @@ def place_of(anchor: Anchor, spans: tuple[tuple[int, int], ...]) -> int:
 
 
 class Maker:
-    """Makes items of the rules of the Klartext grammar."""
+    """Makes the items of a block from its parse tree."""
 
     def __init__(self, builder: TreeBuilder) -> None:
         self.builder = builder
@@ -328,7 +326,7 @@ class Maker:
                 yield self.rule(node)
 
     def terminal(self, token: Token, following: list[Node]) -> Item:
-        """An item that begins with a terminal."""
+        """The item that begins with a terminal; it may take the next node from `following`."""
         span = self.builder.span(token)
         match kind(token):
             case "SKIP":
@@ -348,12 +346,12 @@ class Maker:
         return Command(normal(token), (), False, span)
 
     def statement(self, token: Token, name: str) -> Item:
-        """A statement that is not taken apart, without the blanks at its end."""
+        """The item of a statement whose text is not analysed, without blanks at its end."""
         start = edges(token)[0]
         return Opaque(name, self.builder.between(start, start + len(str(token).rstrip())))
 
     def rule(self, tree: Branch) -> Item:
-        """An item of several terminals."""
+        """The item that a grammar rule stands for."""
         span = self.builder.span(tree)
         first = tree.children[0]
         match kind(tree):
@@ -379,13 +377,13 @@ class Maker:
         raise AssertionError(f"the grammar has a rule {tree.data!r} that nobody builds")
 
     def code(self, node: Node) -> Word:
-        """M with its number, which is part of the shape."""
+        """The word of an M code, whose number is part of the shape."""
         start, stop = edges(node)
         value = Constant(value_of(str(node)[1:]))
         return Word("M", value, self.builder.between(start, stop), self.builder.between(start + 1, stop))
 
     def times(self, nodes: list[Node]) -> tuple[Expression, ...]:
-        """The count of `REP 2/2`, if it is there."""
+        """The count of `REP 2/2`; empty without REP."""
         return tuple(Constant(float(re.findall(r"\d+", str(node))[0])) for node in nodes[1:])
 
     def name(self, node: Node) -> Expression:

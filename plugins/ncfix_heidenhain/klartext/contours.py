@@ -1,7 +1,7 @@
-"""Free contours (FK) of a program: their blocks read, worked out (`free`), and written as plain lines and arcs.
+"""Free contours (FK) of a program: reading their blocks, working them out (`free`), and writing plain lines and arcs.
 
-A free contour is worked out as a whole where its first element is reached. Its blocks are refused as they stand, since
-one corrected element would contradict the data of the others; written out flat they are blocks of their own.
+A free contour is worked out as a whole when its first element is reached. Its blocks are refused, since a corrected
+element would contradict the data of the others; --flatten writes them as plain lines and arcs.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from ncfix_heidenhain.klartext.units import KlartextUnit
 
 FREE_CONTOUR = "free contour programming (FK): the control works out the contour from what is known of it"
 WRITTEN_OUT = "a free contour (FK): --flatten writes it as lines and arcs"
-NEAR = 1e-3
-"""mm by which the data of a contour may contradict each other: drawings have three digits."""
+MAX_GAP_MM = 1e-3
+"""By how much the data of a contour may contradict each other: drawings have three decimals."""
 
 FUNCTION = re.compile(r"F(?P<arc>C|L)(?P<tangential>T?)(?=\s|$)", re.IGNORECASE)
 VALUE = r"[+-]?\s*(?:Q[LR]?\d+|\d+[.,]?\d*|[.,]\d+)"
@@ -33,16 +33,16 @@ SENSE = re.compile(r"(DR|CLSD)\s*([+-])(?!\s*[\d.,Q])", re.IGNORECASE)
 REST = re.compile(
     rf"\b(R0(?![\d.,])|R[LR]\b|F\s*MAX|F\s*AUTO|F\s*{VALUE}|M\s*(?:[0134578]|9|13|14)(?!\d))", re.IGNORECASE
 )
-"""What may stand in a block besides geometry, and is kept when it is written anew: spindle, coolant, a stop."""
+"""What a block may have besides geometry, and keeps when it is rewritten: compensation, feed, some M codes."""
 
 LEFT_OUT = re.compile(r";[^\r\n]*|~(?=[ \t\r]*(?:\n|\Z))")
-"""Of a statement: remarks, and what says that it goes on in the next line."""
+"""What is taken out of a statement before it is read: comments, and `~` at the end of a line."""
 
 OF_LINES, OF_ARCS = frozenset({"X", "Y", "AN", "LEN"}), frozenset({"X", "Y", "CCX", "CCY", "CCA", "R"})
 
 
 def solved_element(control: KlartextControl, unit: KlartextUnit, block: int) -> ContourElement | None:
-    """The element of a block, worked out from where the control stands; None if its contour is not certain."""
+    """The element of a block, worked out with its whole contour; None if the contour is not certain."""
     known = control.path.free
     if (unit.external, block) not in known:
         known.clear()
@@ -51,9 +51,9 @@ def solved_element(control: KlartextControl, unit: KlartextUnit, block: int) -> 
 
 
 def follow_free(control: KlartextControl, unit: KlartextUnit, block: int) -> None:
-    """An element of a free contour, which is refused: as for an arc, it matters where the motion before it ends.
+    """Execute an element of a free contour: it is refused, and the motion before must end where the program says.
 
-    It lies in the working plane: only X and Y of the frame are not known after one that is not certain.
+    The element lies in the working plane, so after one that is not certain only X and Y are not known.
     """
     element = solved_element(control, unit, block)
     control.path.free.pop((unit.external, block))
@@ -74,7 +74,7 @@ def follow_free(control: KlartextControl, unit: KlartextUnit, block: int) -> Non
 def worked_out(
     control: KlartextControl, unit: KlartextUnit, first: int
 ) -> dict[tuple[str, int], ContourElement | None]:
-    """The contour that begins with a block."""
+    """(program, block) -> element, for the contour that begins with a block; all None if it is not certain."""
     blocks = list(blocks_of_contour(unit, first))
     keys = [(unit.external, block) for block in blocks]
     control.use_start_positions((X, Y))
@@ -87,12 +87,13 @@ def worked_out(
     known = [element for element in elements if element is not None]
     begin = here(control).inner
     start = complex(begin[X] / control.scale[X], begin[Y] / control.scale[Y])
-    found = solved(known, start, heading_of(control), NEAR / control.stretch) if len(known) == len(blocks) else None
+    near = MAX_GAP_MM / control.stretch
+    found = solved(known, start, heading_of(control), near) if len(known) == len(blocks) else None
     return dict.fromkeys(keys) if found is None else dict(zip(keys, found, strict=True))
 
 
 def blocks_of_contour(unit: KlartextUnit, first: int) -> Iterator[int]:
-    """The elements of a contour: block after block, with corners between them."""
+    """The blocks with elements of a contour; corners and empty blocks may stand between them."""
     for block in range(first, unit.stop):
         plan = unit.plan(block)
         if plan.statement is not None and FUNCTION.match(statement_text(unit, block)):
@@ -102,14 +103,14 @@ def blocks_of_contour(unit: KlartextUnit, first: int) -> Iterator[int]:
 
 
 def statement_text(unit: KlartextUnit, block: int) -> str:
-    """What stands in a block without its number and remarks."""
+    """The statement of a block without comments."""
     statement = unit.plan(block).statement
     assert statement is not None
     return LEFT_OUT.sub(" ", unit.program.slice(block, statement[1])).strip()
 
 
 def heading_of(control: KlartextControl) -> complex | None:
-    """The direction in which the element before ends, in the working plane."""
+    """The direction in the working plane in which the element before ends; None if it is not known."""
     tangent = control.path.tangent
     if tangent is None:
         return None
@@ -118,7 +119,7 @@ def heading_of(control: KlartextControl) -> complex | None:
 
 
 def element_of(control: KlartextControl, text: str) -> Element | None:
-    """What a block says of its element; None if something in it is not understood, or known only at run time."""
+    """The data that a block gives of its element; None if some are not understood, or known only at run time."""
     found = FUNCTION.match(text)
     if found is None:
         return None
@@ -158,7 +159,7 @@ def number(text: str, parameters: QParameters) -> Value:
 
 
 def in_radians(values: Mapping[str, float], name: str) -> float | None:
-    """An angle."""
+    """The value of an address in degrees as rad; None without it."""
     return math.radians(values[name]) if name in values else None
 
 
@@ -166,9 +167,9 @@ def in_radians(values: Mapping[str, float], name: str) -> float | None:
 
 
 def written_out(control: KlartextControl, unit: KlartextUnit, block: int, place: Callable[[complex], str]) -> list[str]:
-    """An element as plain blocks, which leave the pole as it was; none where it is not certain.
+    """Plain blocks for an element, which restore the pole; none if the element is not certain.
 
-    place  a point as words
+    place  writes a point as words
     """
     statement = unit.plan(block).statement
     if statement is None or not FUNCTION.match(statement_text(unit, block)):

@@ -1,4 +1,4 @@
-"""The TNC while it follows a program: what a block changes and later blocks rely on."""
+"""The state of a TNC control while a program is followed: what blocks change, and later blocks depend on."""
 
 from __future__ import annotations
 
@@ -18,15 +18,14 @@ from ncfix_heidenhain.klartext.free import ContourElement
 from ncfix_heidenhain.klartext.plans import ALWAYS_MOVING, LEADING, MOVING, FormulaScope, QParameters
 
 START = "PRESET"
-"""The name in the setup of the preset that is active when the program starts; G54 is taken for it."""
+"""The setup's name for the preset that is active when the program starts; without it the setup's G54 is used."""
 
 BY_DEPTH, FROM_START = 2000, 1000
-"""Motion codes of holes: with depths from the datum, and with depths from where the cycle is called."""
+"""Motion codes of holes: with depth from the datum, and with depth from where the cycle is called."""
 
 TILTED, DOUBTFUL, TOOL, PRESET, TURNED_DATUM = "tilt", "doubt", "tool", "preset", "turned datum"
 SPATIAL_MODE = "axis spat"
-"""The keys under which motions are suspended."""
-
+"""The keys under which corrections are suspended."""
 
 WHICH_WAY = (
     "the axis {} counts from a datum of its own while the tip leads (M128, PLANE): whether X and Y turn with that "
@@ -42,13 +41,15 @@ AFTER_CYCLE = "where the axis {} stands after a cycle with a path of its own is 
 SPATIAL_ANGLES = "FUNCTION TCPM AXIS SPAT: A B C are spatial angles, not positions of axes"
 SPATIAL = "where the axis {} stands by spatial angles (AXIS SPAT) the control works out"
 LED_BY_CONTROL = frozenset({SPATIAL, RETRACTED, MOVED_ALONG, DEPARTED, AFTER_PROBING, FREELY, AFTER_CYCLE})
-"""Rapids while an axis stands where the control itself has led it are passed: the tool is off the workpiece, and the
-next block that names the axis is corrected."""
+"""Reasons why an axis is not known that mean: the control itself has moved it.
+
+Rapids from there are passed, since the tool is off the workpiece; the next block that names the axis is corrected.
+"""
 
 
 @frozen
 class HolePosition:
-    """Where a hole is, and by how much its surface is above that of the cycle."""
+    """The place of a hole, program units; `height`: how far its surface is above that of the cycle."""
 
     x: float
     y: float
@@ -57,18 +58,18 @@ class HolePosition:
 
 @mutable
 class PathFunctionState:
-    """What the next path function may need of the ones before.
+    """What path functions and blocks before leave to the next path function.
 
-    pole     the pole, mm along the axes of its plane in the program's frame; None where not known
-    pole_in  the frame in which it was set: datum along its axes, rotation, unit
-    plane    the plane of the pole
-    tangent  the direction in which the last path element ended, commands; None where there is none
-    corner   the block before was a corner (RND, CHF)
-    ahead    the block that follows is one
-    doubtful  M127 stands in the block: it ends the shorter ways of M126, at the end of the block if manuals are right
-    spatial  A B C are spatial angles, not positions of axes (FUNCTION TCPM AXIS SPAT)
-    by_vector  the tool turns in a plane (PATHCTRL VECTOR), not its axes at even speed
-    free     elements of the free contour (FK) that is being made: program and block -> what it is, None: not certain
+    pole       pole, mm along the axes of its plane in the program's frame; None if it is not known
+    pole_in    the frame in which the pole was set: datum along its axes, rotation, unit
+    plane      the plane of the pole
+    tangent    the direction in which the last path element ended, in commands; None if there is none
+    corner     the block before is a corner (RND, CHF)
+    ahead      the next block is a corner
+    doubtful   the block has M127 while M126 is in force; whether M127 acts at its end is not certain
+    by_vector  the tool turns in a plane (PATHCTRL VECTOR); else its axes turn evenly
+    spatial    A B C are spatial angles, not positions of axes (FUNCTION TCPM AXIS SPAT)
+    free       (program, block) -> element of the free contour (FK) that is being made; None if it is not certain
     """
 
     pole: tuple[float, float] | None = None
@@ -87,10 +88,10 @@ class PathFunctionState:
 class CycleInForce:
     """The cycle that CYCL CALL, M99 and M89 execute.
 
-    number  0: none was defined
-    steps   of the old cycles, what 1.1, 1.2, ... say: address or word -> value
-    modal   M89: every positioning block executes it
-    places  of the last PATTERN DEF; None: there was none, or it is not followed
+    number  number of the cycle; 0 if none was defined
+    steps   `part:address` -> value, for the words of the parts (1.1, 1.2, ...) of an old cycle
+    modal   M89 is in force: every positioning block executes the cycle
+    places  the holes of the last PATTERN DEF; None if there was none, or it is not followed
     """
 
     number: int = 0
@@ -100,12 +101,19 @@ class CycleInForce:
 
 
 class KlartextControl(base.ProgramControl):
-    """A TNC: its transformations, Q parameters, path functions and cycles.
+    """A TNC control: its transformations, Q parameters, path functions and cycles.
 
-    plane_tilted  PLANE or cycle 19 has tilted the plane
-    turn          rotation in the working plane (cycle 10), degrees
-    doubtful      why the transformations in force are not sure; empty while they are
-    functions     the transformations that a TRANS function has set, and no cycle
+    plane_tilted    PLANE or cycle 19 has tilted the plane
+    turn            rotation in the working plane (cycle 10), degrees
+    doubtful        why the transformations in force are not certain; empty if they are
+    functions       the transformations that were set by a TRANS function, not by a cycle
+    m128            tool centre point control is on (M128, FUNCTION TCPM)
+    shortest        rotary axes take the shorter way (M126)
+    auto_feed       feed of the last TOOL CALL, mm/min
+    oversize        DL of the last TOOL CALL, mm
+    preset_checked  the active preset is given in the setup, or a lack of it has been reported
+    tool_called     a TOOL CALL was executed, or the length of the first tool has been asked for
+    defined_tools   tool number -> what TOOL DEF says of it
     """
 
     frame_order = ("datum", "programmable", "plane", "local", "rotation", "mirror", "scaling")
@@ -135,7 +143,7 @@ class KlartextControl(base.ProgramControl):
     # -- coordinates --------------------------------------------------------------------------------------------------
 
     def load_preset(self, name: str) -> None:
-        """Make a preset of the setup the active one; what is not given counts as zero, and is asked for when used."""
+        """Activate a preset of the setup; one that the setup lacks counts as zero, and `use` asks for it."""
         given = self.setup.work_offsets.get(name)
         self.preset_checked = given is not None
         self.places.shift(mask_of(self.axis_indices))
@@ -145,7 +153,7 @@ class KlartextControl(base.ProgramControl):
         self.recompose()
 
     def recompose(self) -> None:
-        """Take frames into force, and what is doubtful of them; to be called after any of them has changed."""
+        """Put the frames, and doubts about them, into force; to be called after any of them has changed."""
         self.doubt_turned_datum()
         if self.doubtful:
             self.suspend(DOUBTFUL, self.doubtful)
@@ -154,7 +162,7 @@ class KlartextControl(base.ProgramControl):
         self.refresh()
 
     def switch_tip(self) -> None:
-        """Whether X Y Z are tool-tip coordinates may have changed."""
+        """Put tip control on or off, as M128 and tilted planes now ask; to be called after either has changed."""
         on = self.m128 or self.plane_tilted
         self.doubt_turned_datum()
         if on != self.tcp:
@@ -165,7 +173,7 @@ class KlartextControl(base.ProgramControl):
         self.refresh()
 
     def doubt_turned_datum(self) -> None:
-        """Rotary axes with a datum of their own: it may turn the coordinates in which the tip is led."""
+        """Suspend corrections under tip control if a rotary axis has a datum, which may turn the coordinates."""
         self.resume(TURNED_DATUM)
         datum = [a + b for a, b in zip(self.frames.datum.shift, self.frames.programmable.shift, strict=True)]
         turned = next((i for i in self.turning if datum[i]), None)
@@ -173,7 +181,7 @@ class KlartextControl(base.ProgramControl):
             self.suspend(TURNED_DATUM, WHICH_WAY.format(LETTERS[turned]))
 
     def anchors(self) -> list[Hashable]:
-        """As of every control; shift, rotation, mirror and scale are stated by the program in numbers."""
+        """See `ProgramControl`; shift, rotation, mirror and scale are no part: the program states them in numbers."""
         frames, tool = self.frames, self.tool_shift
         stated = self.tcp, frames.plane.rotation if self.plane_tilted else None
         length = [self.tools.offset if self.tcp or index == Z else None for index in (X, Y, Z)]
@@ -183,7 +191,7 @@ class KlartextControl(base.ProgramControl):
         ]
 
     def use(self) -> None:
-        """A motion in workpiece coordinates: preset and tool length matter."""
+        """Note a motion in workpiece coordinates, for which preset and tool length have to be known."""
         if not self.preset_checked:
             self.preset_checked = True
             preset = self.frames.name
@@ -193,7 +201,7 @@ class KlartextControl(base.ProgramControl):
         self.ask_for_tool()
 
     def ask_for_tool(self) -> None:
-        """Before the first TOOL CALL it matters which tool is in the spindle."""
+        """Before the first TOOL CALL, ask for the length of the tool in the spindle."""
         if not self.tool_called:
             self.tool_called = True
             self.tools.vector[Z] = self.knowledge.tool_length(0)
@@ -202,11 +210,10 @@ class KlartextControl(base.ProgramControl):
     # -- motions ------------------------------------------------------------------------------------------------------
 
     def make(self, motion: Motion) -> None:
-        """As of every control.
+        """See `ProgramControl`; some motions are marked that must not be split.
 
-        What must not be split: elements at a corner that the control makes (RND, CHF), turns of the tool in a plane
-        (PATHCTRL VECTOR), which in pieces would be turns of axes, motions whose time is given (FT), and increments of
-        an axis whose datum is not known, which further pieces would have to name.
+        They are: elements beside a corner that the control makes (RND, CHF); turns of the tool in a plane (PATHCTRL
+        VECTOR) or in a block with M127; motions whose time is given (FT); and motions of axes whose datum is not known.
         """
         if motion.kind == MotionKind.RAPID and not motion.refusal and AT_START in motion.end.unknown.values():
             motion = motion._replace(passing=motion.passing or Passing(Pass.UNSAID, first_reason(motion.end.unknown)))
@@ -225,7 +232,7 @@ class KlartextControl(base.ProgramControl):
         self.whole = whole
 
     def placed_by(self, motion: Motion) -> int:
-        """As of every control; a cycle with depths from the datum says where the tool axis stands, too."""
+        """See `ProgramControl`; a cycle with depth from the datum states the position of the tool axis, too."""
         if motion.placed is not None:
             return motion.placed
         own = motion.axes | (1 << Z if motion.code == BY_DEPTH else 0)
@@ -233,21 +240,24 @@ class KlartextControl(base.ProgramControl):
         return 0 if self.modal.incremental or machine else own
 
     def is_led(self, unknown: UnknownAxes) -> bool:
-        """What is not known is so because the control itself has led the axes somewhere."""
+        """Whether all that is not known is so because the control itself has moved the axes (`LED_BY_CONTROL`)."""
         return bool(unknown) and LED_BY_CONTROL.issuperset(unknown.values())
 
     def path_word(self, words: Collection[str]) -> str:
-        """Words of axes, polar coordinates and directions, and path functions that need none."""
+        """One of the words that make a block move: of axes, polar coordinates, directions, or path functions.
+
+        Empty if the block does not move.
+        """
         names = (word for word in words if word in ALWAYS_MOVING or word.startswith(LEADING))
         return min(MOVING.intersection(words), default="") or next(names, "").upper()
 
     def refuse_here(self, reason: str) -> None:
-        """As of every control."""
+        """See `ProgramControl`; the direction of the path is not known after it."""
         super().refuse_here(reason)
         self.path.tangent = None
 
     def pass_here(self, passing: Passing, lost: str, letters: str) -> None:
-        """A motion of the control's own; these axes are not known afterwards."""
+        """Note a motion that the control makes by itself; `letters`: axes that are not known after it, for `lost`."""
         unknown = dict(self.unknown)
         unknown |= {INDEX[letter]: lost for letter in letters if INDEX[letter] in self.axis_indices}
         super().make(Motion(MotionKind.RAPID, 0, MotionEnd(self.position[:], unknown), 0, passing=passing))

@@ -1,8 +1,8 @@
-"""Free contours (FK): lines and arcs of which the program says as much as a drawing does, worked out one after another.
+"""Free contours (FK): lines and arcs with only the data that a drawing gives, worked out one after another.
 
-Points are complex numbers in the working plane, in program units. Only what has one solution is worked out: where the
-data of an element leave two, or contradict each other, there is none. An arc of a known circle may end where the next
-element touches it.
+Points are complex numbers in the working plane, in program units. A contour is worked out only if it has exactly one
+solution: not if the data of an element leave two, or contradict each other. An arc on a known circle may end where the
+next element touches the circle.
 
 Source: TNC 640, "FK free contour programming".
 """
@@ -21,19 +21,19 @@ FLAT = 1e-9
 
 @frozen
 class Element:
-    """What the program says of one element.
+    """The data that the program gives of one element; None for those that it does not give.
 
-    arc         FC and FCT, else FL and FLT
-    tangential  FLT and FCT: it goes on in the direction of the one before
+    arc         an arc (FC, FCT), else a line (FL, FLT)
+    tangential  FLT and FCT: it starts in the direction in which the element before ends
     x, y        its end
     angle       AN: the direction of a line, rad
-    length      LEN of a line
-    centre      CCX and CCY
-    radius      R
-    sense       1 for DR+, -1 for DR-
-    turn        CCA: the angle of an arc, rad
-    opens       CLSD+: a closed contour begins with it
-    closes      CLSD-: it ends where that began
+    length      LEN: the length of a line
+    centre      CCX and CCY: the centre of an arc
+    radius      R: the radius of an arc
+    sense       1 for DR+, -1 for DR-, 0 if it is not given
+    turn        CCA: the angle of an arc about its centre, rad
+    opens       CLSD+: a closed contour begins with this element
+    closes      CLSD-: it ends where the closed contour began
     """
 
     arc: bool
@@ -51,12 +51,12 @@ class Element:
 
     @property
     def end(self) -> complex | None:
-        """Its end, if all of it is said."""
+        """Its end; None unless both coordinates are given."""
         return None if self.x is None or self.y is None else complex(self.x, self.y)
 
     @property
     def circle(self) -> DirectedCircle | None:
-        """Its circle, if all of it is said."""
+        """Its circle; None unless centre, radius and sense are given."""
         if self.centre is None or self.radius is None or not self.sense:
             return None
         return DirectedCircle(self.centre, self.radius, self.sense)
@@ -64,25 +64,25 @@ class Element:
 
 @frozen
 class DirectedCircle:
-    """A circle with the sense in which it is gone round."""
+    """A circle, with the sense in which the contour goes round it: 1 counterclockwise, -1 clockwise."""
 
     centre: complex
     radius: float
     sense: int
 
     def heading(self, at: complex) -> complex:
-        """The direction at one of its points."""
+        """The direction of the contour at one of its points."""
         spoke = at - self.centre
         return self.sense * 1j * spoke / abs(spoke)
 
     def touched(self, heading: complex) -> complex:
-        """Its point with that direction."""
+        """The point of the circle at which the contour has this direction."""
         return self.centre - self.sense * 1j * self.radius * heading
 
 
 @frozen
 class ContourElement:
-    """An element that is worked out: its end, the direction there, and its circle if it is an arc."""
+    """An element that has been worked out: its end, the direction there, and its circle if it is an arc."""
 
     end: complex
     heading: complex
@@ -90,16 +90,16 @@ class ContourElement:
 
 
 class NoSolutionError(Exception):
-    """There is none, or more than one."""
+    """The data of a contour have no solution, or more than one."""
 
 
 def solved(
     elements: Sequence[Element], start: complex, heading: complex | None, near: float
 ) -> list[ContourElement] | None:
-    """The elements of a contour from where it starts; None if they are not all certain.
+    """The elements of a contour that begins at `start`; None unless all of them are certain.
 
-    heading  the direction in which the element before ends, if there is one
-    near     by how much data may contradict each other
+    heading  the direction in which the element before ends; None if there is none
+    near     by how much data may contradict each other, program units
     """
     chain = _Chain(start, heading, near)
     try:
@@ -111,7 +111,13 @@ def solved(
 
 
 class _Chain:
-    """The contour as far as it is worked out; `open` is the circle of a last arc whose end is not yet known."""
+    """A contour as far as it has been worked out.
+
+    at       where it has come to
+    heading  the direction there
+    open     the circle of the last arc while its end is not known yet
+    home     where the closed contour began
+    """
 
     def __init__(self, start: complex, heading: complex | None, near: float) -> None:
         self.at = start
@@ -122,7 +128,7 @@ class _Chain:
         self.home: complex | None = None
 
     def add(self, element: Element, following: Element | None) -> None:
-        """One more element; raises `NoSolutionError`."""
+        """Work out the next element; raises `NoSolutionError`."""
         if element.opens:
             self.home = self.at
         if element.closes:
@@ -154,7 +160,7 @@ class _Chain:
         self._append(ContourElement(end, (end - self.at) / abs(end - self.at)))
 
     def _direction(self, element: Element) -> complex | None:
-        """In which direction a line goes, if that is said."""
+        """The direction of a line; None if it is not given."""
         stated = None if element.angle is None else cmath.rect(1.0, element.angle)
         if not element.tangential:
             return stated
@@ -165,7 +171,7 @@ class _Chain:
         return self.heading
 
     def _along(self, element: Element, direction: complex) -> complex | None:
-        """Where a line of known direction ends."""
+        """The end of a line of known direction, by its length or one coordinate; None if that is not given."""
         if element.length is not None:
             return self.at + element.length * direction
         for value, part, begin in (
@@ -177,9 +183,9 @@ class _Chain:
         return None
 
     def _leave(self, circle: DirectedCircle, element: Element, target: DirectedCircle | None) -> complex | None:
-        """End an arc where a line leaves it: of a known direction, to a known end, or to the next circle.
+        """End the open arc where a tangential line leaves it.
 
-        Returns where the line touches that.
+        The line has a known direction, leads to a known end, or touches the next circle: returns where it does.
         """
         reached = None
         if not element.tangential:
@@ -222,7 +228,7 @@ class _Chain:
         self._append(ContourElement(end, circle.heading(end), circle))
 
     def _circle(self, element: Element) -> DirectedCircle:
-        """The circle of an arc that begins here."""
+        """The circle of an arc that begins where the contour has come to."""
         if element.centre is not None and element.sense:
             size = abs(self.at - element.centre) if element.radius is None else element.radius
             return DirectedCircle(element.centre, size, element.sense)
@@ -237,7 +243,7 @@ class _Chain:
         )
 
     def _through(self, element: Element, end: complex, heading: complex) -> DirectedCircle:
-        """The circle that goes on in a direction and leads to an end."""
+        """The circle on which an arc starts in a direction and leads to an end."""
         side = ((end - self.at) * heading.conjugate()).imag
         if abs(side) < self.near:
             raise NoSolutionError
@@ -250,7 +256,7 @@ class _Chain:
         return DirectedCircle(self.at + 1j * radius * heading, abs(radius), sense)
 
     def _touch(self, circle: DirectedCircle, element: Element) -> None:
-        """End an arc where the next one, of a known circle, touches its own."""
+        """End the open arc where the known circle of the next arc touches its own."""
         other = element.circle
         if other is None or not element.tangential:
             raise NoSolutionError
@@ -280,7 +286,7 @@ class _Chain:
 
 
 def touching(way: complex, across: float) -> complex:
-    """The direction in which one goes `way` if of it so much is to the left of that direction, `across`."""
+    """The direction for which `way` has the part `across` to its left, and the rest ahead."""
     along = abs(way) ** 2 - across**2
     if along <= FLAT:
         raise NoSolutionError

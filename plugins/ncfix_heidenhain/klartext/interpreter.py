@@ -1,4 +1,4 @@
-"""The walk through a Klartext program: block after block, as labels and calls lead, with the path functions by name."""
+"""Following a Klartext program block by block, through its labels, calls and jumps."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ PATHS = {
     "ct": tangential,
     "ctp": tangential,
 }
-"""Path functions by name."""
+"""Path function -> what executes it; "" is a block of words alone."""
 
 TAKES = {
     **dict.fromkeys(("l", "ln"), CARTESIAN | VECTOR),
@@ -68,13 +68,13 @@ TAKES = {
     **dict.fromkeys(("dep lt", "dep ln", "dep ct"), frozenset[str]()),
     **dict.fromkeys(("cycl call", "cycl call pos"), CARTESIAN),
 }
-"""Path function -> the words among `MOVING` that lead it."""
+"""Path function -> the words of `MOVING` that it accepts."""
 
 TURNING = frozenset({"c", "cp", "cr"})
-"""What takes a sense of rotation, DR+ or DR-."""
+"""Path functions that accept a sense of rotation, DR+ or DR-."""
 
 CALLING = frozenset({"", "l", "ln", "lp", "cycl call", "cycl call pos"})
-"""What may execute a cycle where it leads; behind an arc there would be two motions in one block."""
+"""Blocks that may execute a cycle at their end; after an arc there would be two motions in one block."""
 
 NOT_TAKEN = "{} takes no word {}: the control would stop, or makes a path of it that is not followed"
 TWICE = "{} with a word {} in the plane of its pole: where the control would go is not sure"
@@ -86,9 +86,9 @@ COUNTED_HEIGHT = "CYCL CALL POS with a height in increments (IZ): from where the
 
 
 def astray(control: KlartextControl, step: Step, *, called: bool) -> str:
-    """Why a block cannot be followed for the words that it has or lacks; empty if it can.
+    """Why a block cannot be followed because of words that it has or lacks; empty if it can be followed.
 
-    called  it executes a cycle where it leads
+    called  the block executes a cycle at its end
     """
     name, words = step.name, step.words.values
     said = name.upper() or "a block of words alone"
@@ -118,18 +118,18 @@ RADIUS = "it is the radius of the tool: --tool NUMBER=LENGTH,RADIUS"
 ENDS_INSIDE = "a called program with M2 or M30, which the manuals do not allow"
 SUFFIX = re.compile(r"\.h\Z", re.IGNORECASE)
 ELSEWHERE = re.compile(r"CALL\b|SEL\s+PGM\b|F(LT?|CT?)(?=\s|$)", re.IGNORECASE)
-"""Statements that lead to other programs, or depend on what follows: elements of free contours (FK)."""
+"""Statements that rule out reading in parts: calls of other programs, and free contours (FK), which depend on later
+blocks."""
 
 NOT_OF_MOTION = frozenset({"F", "FU", "FZ", "FT", "S", "T", "ANG", "NX", "NY", "NZ"})
-"""Addresses in motion blocks that lead nowhere."""
-
+"""Addresses in motion blocks that do not change where the motion leads."""
 
 POLES = frozenset({"c", "cc", "cp", "ctp", "lp"})
-"""Path functions that set a pole or go by one; approaches and departures in polar words do, too."""
+"""Path functions that set a pole or depend on one; polar approaches and departures do so, too."""
 
 
 def has_to_do_with_poles(template: Template) -> bool:
-    """Whether blocks of a shape set a pole or may go by one."""
+    """Whether blocks of a shape set a pole or depend on one."""
     names = (item.name for item in template.items if isinstance(item, Command))
     return any(name in POLES or name.startswith(("appr p", "dep p")) for name in names)
 
@@ -137,9 +137,10 @@ def has_to_do_with_poles(template: Template) -> bool:
 class KlartextInterpreter(Interpreter[KlartextUnit]):
     """Follows one program.
 
-    comma   the parts so far have decimal commas; None before the first one
-    shapes  how many shapes have been looked at, and
-    polar   those of them that have to do with poles
+    comma    whether the parts read so far have decimal commas; None before the first part
+    shapes   the number of shapes that have been searched for poles
+    polar    the shapes, among those, that have to do with poles
+    no_lane  a unit, and those of its blocks at which the fast lane is not worth a try
     """
 
     control: KlartextControl
@@ -164,12 +165,12 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         control.recompose()
 
     def moves(self) -> Moves:
-        """See `Interpreter`; rotary axes do not get words everywhere."""
+        """See `Interpreter`; in some blocks rotary axes get no words unless they have one (`words_alone_turn`)."""
         moves = super().moves()
         return replace(moves, words_alone_turn=words_alone_turn(self.main.program)[moves.block])
 
     def spellings(self, name: str) -> Iterable[str]:
-        """See `Interpreter`: beside this program, without folders."""
+        """See `Interpreter`: file names beside this program, with any folders taken off."""
         base = re.split(r"[\\/:]", name.strip().strip('"'))[-1]
         return base, SUFFIX.sub("", base), base + ".h", base + ".H", base.lower(), base.upper()
 
@@ -183,12 +184,12 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         return self.control.scope.parameters.changes
 
     def end_of_text(self) -> bool:
-        """The text is over without END PGM."""
+        """See `Interpreter`: warn that the text ends without END PGM."""
         self.control.warn(NO_END, "the program does not end with END PGM", "it may be cut off")
         return False
 
     def take_stretch(self, plan: KlartextPlan) -> bool:
-        """See `Interpreter`; blocks that do nothing are passed over, too."""
+        """See `Interpreter`; blocks that do nothing are skipped, too."""
         if super().take_stretch(plan):
             return True
         self.flow.block += plan.empty
@@ -239,7 +240,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         return False
 
     def state(self, plan: KlartextPlan, flow: KlartextFlow) -> bool:
-        """A statement that is not taken apart."""
+        """Execute a statement whose text the grammar does not analyse; True if the program ends there."""
         assert plan.statement is not None
         kind, span = plan.statement
         text = flow.unit.program.slice(flow.block - 1, span)
@@ -267,26 +268,26 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         return value != 0.0
 
     def assign(self, plan: KlartextPlan) -> None:
-        """Set Q parameters."""
+        """Assign the Q parameters that a block sets."""
         scope = self.control.scope
         for name, value in plan.assignments:
             scope.parameters.assign(name, value(scope))
 
     def evaluated(self, words: Mapping[str, Evaluate]) -> MotionWords:
-        """The words of a block as numbers."""
+        """The words of a block with their values."""
         scope = self.control.scope
         values = {address: value(scope) for address, value in words.items()}
         unknown = frozenset(address for address, value in values.items() if isinstance(value, Unknown))
         return MotionWords({address: nominal(value) for address, value in values.items()}, unknown)
 
     def tool_of(self, plan: KlartextPlan) -> str | float | Unknown | None:
-        """The number or name of a tool."""
+        """The number or name of the tool that a block names; None without one."""
         if plan.tool is None or isinstance(plan.tool, str):
             return plan.tool
         return plan.tool(self.control.scope)
 
     def names(self, plan: KlartextPlan, flow: KlartextFlow) -> str:
-        """The words of a cycle definition that have no value."""
+        """The texts of a cycle definition that are no words with values, joined by blanks."""
         program, block = flow.unit.program, flow.block - 1
         items = program.items_of(block)
         return " ".join(program.slice(block, item.span) for item in items if isinstance(item, Opaque))
@@ -294,7 +295,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
     # -- motions ------------------------------------------------------------------------------------------------------
 
     def motion(self, plan: KlartextPlan, words: MotionWords, flow: KlartextFlow) -> bool:
-        """A block of path words and M codes; True if it ends the program."""
+        """Execute a block with a path function, axis words or M codes; True if it ends the program."""
         control = self.control
         codes = frozenset(code for code, _ in plan.codes)
         control.enter_block((*words.values, plan.name))
@@ -314,7 +315,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         return bool(codes & {2, 30}) and not control.external
 
     def note_foreign(self, plan: KlartextPlan, step: Step) -> None:
-        """Note axes that the program moves and the machine lacks."""
+        """Note axes that the program moves but the machine does not have."""
         control = self.control
         for letter in step.words.letters:
             if control.path.spatial and letter in "ABC":
@@ -325,7 +326,10 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
                 self.span = None
 
     def feed(self, words: MotionWords, plan: KlartextPlan) -> None:
-        """F, in mm or inches per minute; FU per revolution; FAUTO as TOOL CALL has it."""
+        """Set the feed: F per minute, FU per revolution, FAUTO that of the last TOOL CALL.
+
+        FZ (per tooth) and FT (by time) leave it unknown.
+        """
         modal = self.control.modal
         for address, mode in (("F", 94), ("FU", 95), ("FZ", 95), ("FT", 94)):
             if address in words.values:
@@ -336,7 +340,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             modal.feed = self.control.auto_feed
 
     def move(self, plan: KlartextPlan, step: Step) -> None:
-        """What moves in a block, if anything does."""
+        """Execute the motion of a block, if it has one."""
         control = self.control
         if step.name == "cc":
             set_pole(control, step.words)
@@ -370,19 +374,19 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
     # -- a part of a program -----------------------------------------------------------------------------------------
 
     def check_part(self, program: Program) -> None:
-        """See `Interpreter`: the writing of a block goes by the manner of numbers, and poles, elsewhere in the text."""
+        """See `Interpreter`: how a block is written depends on commas and poles elsewhere in the text."""
         self._check_manner(program.source)
         self._check_poles(program)
 
     def _check_manner(self, source: bytes) -> None:
-        """Raise `NotInPartsError` where numbers have points and commas."""
+        """Raise `NotInPartsError` if some numbers have decimal points and others commas."""
         commas, points = axis_numbers(source)
         if (commas and points) or self.comma not in (None, bool(commas)):
             raise NotInPartsError("the program has decimal points and commas")
         self.comma = bool(commas)
 
     def _check_poles(self, program: Program) -> None:
-        """Raise `NotInPartsError` where a pole was set in an earlier part, or counts from where the tool stands."""
+        """Raise `NotInPartsError` if a block depends on a pole of an earlier part, or a pole on the tool's position."""
         templates = program.templates
         self.polar += [shape for shape in range(self.shapes, len(templates)) if has_to_do_with_poles(templates[shape])]
         self.shapes = len(templates)
@@ -394,7 +398,10 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             raise NotInPartsError("what a pole is depends on an earlier part")
 
     def check_motions(self, program: Program, moves: Moves) -> None:
-        """See `Interpreter`: where a rotary axis comes from beyond zero or a full turn, and stays within them."""
+        """See `Interpreter`: a part is refused if a rotary axis starts beyond its limits and then stays within them.
+
+        The limits are 0 and a full turn. How its words are corrected (`on_its_side`) depends on the other parts.
+        """
         for column in np.flatnonzero(moves.rotary).tolist() if len(moves) else ():
             words = program.column(moves.axes[column])
             words = words[~np.isnan(words)]

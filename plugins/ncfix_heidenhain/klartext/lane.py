@@ -1,10 +1,10 @@
-"""The fast lane of Klartext: stretches of straight motions, arcs and poles with plain numbers, taken all at once.
+"""The fast lane of Klartext: whole stretches of straight motions, arcs and poles with plain numbers, taken at once.
 
-It does what the interpreter would do block by block, with the same operations in the same order, so that the results
-are the same to the last bit; a test holds the two together. What it cannot take it leaves alone.
+It does what the interpreter would do block by block, with the same operations in the same order, so the results are the
+same to the last bit; a test compares the two. Blocks that it cannot take are left to the interpreter.
 
-Of arcs it takes CR, C about a pole, and CP by an angle, in the plane of X and Y. What blocks say is read as columns;
-where a circle lies is worked out arc by arc, with what `arcs` uses.
+It takes three kinds of arcs, in the plane of X and Y: CR, C about a pole, and CP with IPA. The words of all blocks are
+read as columns; circles are worked out arc by arc, with the functions that `arcs` uses.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ ODD = "of this arc the interpreter has more to say"
 
 @frozen
 class KlartextBlockRows:
-    """A stretch as the control takes it, one row per block.
+    """A stretch of n blocks, one row per block.
 
-    path    (n + 1, 9) the command before the first block, and at the end of each
+    path    (n + 1, 9) the command before the first block, and at the end of each block
     feed    (n,) feed in force, mm/min
     motion  (n,) `RAPID`, `FEED`, or the code of an arc
-    side    (n,) radius compensation in force
-    mask    (n,) axis words, as bits; 0: the block moves nothing
+    side    (n,) radius compensation in force: 0, 41 or 42
+    mask    (n,) bit mask of the axes that the block names; 0 if it moves nothing
     """
 
     path: Array
@@ -53,7 +53,7 @@ class KlartextBlockRows:
     mask: Ints
 
     def head(self, count: int) -> KlartextBlockRows:
-        """The first blocks of it."""
+        """The first `count` blocks."""
         if count == len(self.feed):
             return self
         return KlartextBlockRows(
@@ -62,9 +62,9 @@ class KlartextBlockRows:
 
 
 def run_lane(control: KlartextControl, unit: KlartextUnit, block: int) -> tuple[int, int]:
-    """Take the stretch that begins with a block.
+    """Execute as much of the stretch that begins with a block as the fast lane can take.
 
-    Returns how many blocks are taken, 0 for none, and the first block at which it is worth while to try again.
+    Returns how many blocks were executed, and the first block at which it is worth while to try again.
     """
     if not is_open(control):
         return 0, block + 1
@@ -83,7 +83,7 @@ def run_lane(control: KlartextControl, unit: KlartextUnit, block: int) -> tuple[
 
 
 def before_corner(unit: KlartextUnit, block: int, stop: int) -> int:
-    """Where a stretch has to stop: the motion before a corner (RND, CHF) is no plain one."""
+    """Where a stretch has to stop: before the last motion if a corner (RND, CHF) follows it."""
     following = unit.next_plan(stop)
     if following is None or following.name not in CORNERS:
         return stop
@@ -93,7 +93,7 @@ def before_corner(unit: KlartextUnit, block: int, stop: int) -> int:
 
 
 def is_open(control: KlartextControl) -> bool:
-    """Whether the state allows the fast lane at all."""
+    """Whether the state of the control allows the fast lane at all."""
     modal, path = control.modal, control.path
     known = not (control.unknown or control.composed.unknown) and control.preset_checked and control.tool_called
     turned = control.is_rotated or control.plane_tilted
@@ -103,7 +103,7 @@ def is_open(control: KlartextControl) -> bool:
 
 
 def stage_of(control: KlartextControl, unit: KlartextUnit, start: int, stop: int) -> KlartextBlockRows:
-    """What the blocks of a stretch say, and where they lead."""
+    """The rows of a stretch; CP does not lead anywhere yet (see `PolarArcEnds`)."""
     program, tables = unit.program, unit.lanes
     shapes, first = program.template[start:stop], program.first_number[start:stop]
     found = followed(
@@ -115,7 +115,7 @@ def stage_of(control: KlartextControl, unit: KlartextUnit, start: int, stop: int
 
 
 def count_on_one_turn(control: KlartextControl, stage: KlartextBlockRows) -> int:
-    """How many blocks run before one in which a rotary axis takes the shorter way round past a turn (M126)."""
+    """The number of blocks before the first in which a rotary axis takes the shorter way past a turn (M126)."""
     if not control.shortest:
         return len(stage.feed)
     turns = np.zeros(len(stage.feed), dtype=np.bool_)
@@ -126,9 +126,9 @@ def count_on_one_turn(control: KlartextControl, stage: KlartextBlockRows) -> int
 
 
 def count_beside(control: KlartextControl, stage: KlartextBlockRows) -> int:
-    """How many blocks run before one that ends radius compensation (R0), or an arc with it.
+    """The number of blocks before the first that ends radius compensation (R0) or is an arc under compensation.
 
-    From there on it matters what is named.
+    In such a block it matters which axes have words, so the interpreter takes it.
     """
     before = np.append(control.modal.compensated, stage.side[:-1])
     ends = (before != 0) & ((stage.side == 0) | (stage.motion > FEED))
@@ -136,7 +136,7 @@ def count_beside(control: KlartextControl, stage: KlartextBlockRows) -> int:
 
 
 def take(control: KlartextControl, stage: KlartextBlockRows, unit: KlartextUnit, block: int, circles: Circles) -> None:
-    """Add the motions of a stretch, `circles` those of its arcs, and leave the control as they leave it."""
+    """Add the motions of a stretch, and bring the control into the state after it; `circles`: those of its arcs."""
     shapes = unit.program.template[block : block + len(stage.feed)]
     control.resume("M130")
     control.external, control.tilted = unit.external, False
@@ -163,7 +163,7 @@ def take(control: KlartextControl, stage: KlartextBlockRows, unit: KlartextUnit,
 
 
 def styles_of(control: KlartextControl, motion: Ints, side: Ints, relative: Mask) -> Ints:
-    """The styles of motions whose start and end are known; `relative`: they count from where they start."""
+    """(n,) the styles of motions whose start and end are known; `relative`: they depend on where they start."""
     styles = np.empty(len(motion), dtype=np.int64)
     keys = (side << 6 | motion) << 1 | relative
     for key in np.flatnonzero(np.bincount(keys)).tolist():
@@ -175,7 +175,7 @@ def styles_of(control: KlartextControl, motion: Ints, side: Ints, relative: Mask
 
 
 def keep_tangent(control: KlartextControl, path: Array, circles: Circles) -> None:
-    """Note in which direction the last motion went that had a way."""
+    """Note the direction in which the last motion that had a length ended."""
     ways = np.diff(path[:, :3], axis=0)
     arc = int(circles.row[-1]) if len(circles.row) else -1
     for row in np.flatnonzero(np.abs(ways).max(axis=1) > FLAT / 2)[::-1].tolist():
@@ -196,7 +196,14 @@ def keep_tangent(control: KlartextControl, path: Array, circles: Circles) -> Non
 
 
 class ArcBlock(NamedTuple):
-    """What the block of an arc says: its name, R or IPA, sense, X and Y (NaN without), and the pole in force."""
+    """The block of an arc.
+
+    name       `cr`, `c` or `cp`
+    value      R or IPA
+    clockwise  DR-, not DR+
+    end        X and Y, mm; NaN without a word
+    pole       the pole in force, mm; None if there is none that an arc can use
+    """
 
     name: str
     value: float
@@ -208,10 +215,10 @@ class ArcBlock(NamedTuple):
 def circles_of(
     control: KlartextControl, unit: KlartextUnit, start: int, path: Array, motion: Ints
 ) -> tuple[Circles, int]:
-    """The circles of the arcs of a stretch that begins with a block, and how many blocks run before one it cannot take.
+    """The circles of the arcs of a stretch, and the number of blocks before the first that the fast lane cannot take.
 
-    path    (n + 1, 9) commands before the first block and at the end of each; put right behind a CP, which says by an
-            angle where it ends
+    start   first block of the stretch
+    path    (n + 1, 9) commands before the first block and at the end of each; the ends of CP are filled in here
     motion  (n,) motion codes
     """
     shapes, count = unit.program.template[start : start + len(motion)], len(motion)
@@ -241,7 +248,7 @@ def arcs_of(
     rows: Ints,
     motion: Ints,
 ) -> list[ArcBlock]:
-    """What the blocks of arcs `rows` (k,) say."""
+    """The blocks of the arcs in these `rows` (k,) of a stretch."""
     program, lanes, first = unit.program, unit.lanes, unit.program.first_number[start + rows]
     own = shapes[rows]
     x, y = (0.0 + control.scale[axis] * words(program.numbers, first, lanes.words.axes[own, axis]) for axis in (X, Y))
@@ -262,7 +269,7 @@ def arcs_of(
 def poles_of(
     control: KlartextControl, unit: KlartextUnit, start: int, shapes: NDArray[np.int32]
 ) -> tuple[Ints, tuple[Array, Array]]:
-    """Which blocks of a stretch set a pole (CC), and where: mm along X and Y of the program's frame."""
+    """The rows of a stretch that set a pole (CC), and the poles, mm along X and Y of the program's frame."""
     slots = unit.lanes.pole[shapes]
     places = np.flatnonzero(slots[:, 0] >= 0)
     first = unit.program.first_number[start + places]
@@ -271,13 +278,13 @@ def poles_of(
 
 
 def pole_before(control: KlartextControl) -> Point | None:
-    """The pole in force, if an arc in the plane of X and Y may turn about it."""
+    """The pole in force, if it lies in the plane of X and Y and the frame has not changed since; else None."""
     path = control.path
     return path.pole if path.plane == PLANE and path.pole_in == pole_frame(control) else None
 
 
 def end_of(control: KlartextControl, arc: ArcBlock, begin: Point) -> Point:
-    """Where an arc ends, along the axes of the program's frame."""
+    """The end of an arc, mm along X and Y of the program's frame."""
     if arc.name != "cp":
         x, y = arc.end
         return begin[0] if math.isnan(x) else x, begin[1] if math.isnan(y) else y
@@ -289,7 +296,7 @@ def end_of(control: KlartextControl, arc: ArcBlock, begin: Point) -> Point:
 
 
 def circle(control: KlartextControl, arc: ArcBlock, begin: Point, end: Point) -> tuple[Point, float]:
-    """The centre of an arc from its start, and its sweep; raises `Fault` where the interpreter has more to say."""
+    """The centre of an arc from its start, and its sweep; raises `Fault` where the interpreter has to decide."""
     away, clockwise = (end[0] - begin[0], end[1] - begin[1]), arc.clockwise
     if arc.name == "cr":
         centre = centre_from_radius(away, control.stretch * arc.value, clockwise=clockwise)
@@ -306,9 +313,9 @@ def circle(control: KlartextControl, arc: ArcBlock, begin: Point, end: Point) ->
 
 
 class PolarArcEnds:
-    """Where arcs end that say so by an angle: from there on X and Y stand there, until the next word.
+    """Fills in the ends of CP, which has no X and Y: they hold until a later block names X or Y.
 
-    path  (n + 1, 9) as in `circles_of`
+    path  (n + 1, 9) as in `circles_of`; changed in place
     """
 
     def __init__(self, unit: KlartextUnit, path: Array, shapes: NDArray[np.int32]) -> None:
@@ -318,14 +325,14 @@ class PolarArcEnds:
         self.told = [np.append(np.flatnonzero(each), len(shapes)) for each in told]
 
     def lead(self, row: int, end: Point) -> None:
-        """The arc of a row leads to a command."""
+        """Fill in the command at the end of the arc in a row."""
         for axis, told in zip((X, Y), self.told, strict=True):
             stop = told[np.searchsorted(told, row, side="right")]
             self.path[row + 1 : stop + 1, axis] = end[axis]
 
 
 def keep_pole(control: KlartextControl, unit: KlartextUnit, start: int, shapes: NDArray[np.int32]) -> None:
-    """The last pole that a stretch from block `start` on sets is in force behind it."""
+    """Put the last pole that a stretch sets into force."""
     _, (x, y) = poles_of(control, unit, start, shapes)
     if len(x):
         control.path.plane, control.path.pole = PLANE, (float(x[-1]), float(y[-1]))

@@ -1,4 +1,4 @@
-"""Heidenhain Klartext as a `WrittenLanguage`, and which of its motions are written many at a time."""
+"""Heidenhain Klartext as a `WrittenLanguage`, and which of its motions can be written many at a time."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from ncfix_heidenhain.klartext.units import STRAIGHT
 from ncfix_heidenhain.klartext.writing import KlartextWriter, on_its_side, spelling_of
 
 ARCS = frozenset({"c", "cr"})
-FEW = 1e-6
-"""Degrees from zero or a full turn at which a corrected angle is looked at by `BlockWriter`."""
+LIMIT_DEGREES = 1e-6
+"""`BlockWriter` writes motions whose corrected angle comes this near to zero or to a full turn."""
 
 
 def unrolled(interpreter: KlartextInterpreter, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
-    """Follow a program and write down its blocks; raises SourceError NCF237 and NCF238."""
+    """The lines of a program that is written out flat; raises SourceError NCF237 and NCF238."""
     from ncfix_heidenhain.klartext.flatten import KlartextFlattener
 
     style = Spelling(signed=True, comma=uses_comma(interpreter.main.program.source), point=False)
@@ -50,7 +50,7 @@ def unrolled(interpreter: KlartextInterpreter, steps: Mapping[str, float], limit
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
-    """What is needed to write motions like that of a block many at a time; None if they need `BlockWriter`."""
+    """The layout for writing motions like that of a block many at a time; None if they need `BlockWriter`."""
     items = program.items_of(block)
     if any(isinstance(item, Skip | Opaque | OWordLine | Assignment) for item in items):
         return None
@@ -77,10 +77,10 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
 
 
 def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: Ints) -> Mask:
-    """(n,) motions that `BlockWriter` has to look at.
+    """(n,) motions that have to be written one by one, with `BlockWriter`.
 
-    Those beside a corner that the control makes; and where rotary axes are corrected, those in which one has no word,
-    or comes to zero or a full turn.
+    They are the motions beside a corner that the control makes, and motions with a corrected rotary axis if it has no
+    word, if the motion is split, or if the angle comes to zero or a full turn.
     """
     found = beside_corners(program)[moves.block]
     last = first_piece[1:] - 1
@@ -92,8 +92,9 @@ def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: Ints
     found |= corrected.any(axis=1) & (np.diff(first_piece) > 1)
     offset = np.array([frame.offset for frame in moves.frames])[moves.frame][:, moves.rotary]
     before, after = np.degrees(nominal - offset), np.degrees(end - offset)
-    found |= (corrected & (before > -FEW) & (after < FEW)).any(axis=1)
-    found |= (corrected & (before < TURN_DEGREES + FEW) & (after > TURN_DEGREES - FEW)).any(axis=1)
+    low, high = LIMIT_DEGREES, TURN_DEGREES - LIMIT_DEGREES
+    found |= (corrected & (before > -low) & (after < low)).any(axis=1)
+    found |= (corrected & (before < TURN_DEGREES + LIMIT_DEGREES) & (after > high)).any(axis=1)
     return found
 
 

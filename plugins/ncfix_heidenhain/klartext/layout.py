@@ -1,4 +1,4 @@
-"""Where things stand in a Klartext motion block: what may be rewritten, and where missing words go."""
+"""The layout of a Klartext motion block: which parts can be rewritten, and where missing words are put."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from ncfix_heidenhain.klartext.arc_text import in_lines
 from ncfix_heidenhain.klartext.plans import POLAR, VECTOR, opens_block, own_words
 
 CORNERS = frozenset({"rnd", "chf"})
-"""Corners that the control makes of the end of one motion and the beginning of the next."""
+"""Path functions with which the control rounds or chamfers the corner between two motions."""
 
 STRAIGHT = frozenset({"", "l", "ln", "lp"})
 
@@ -39,26 +39,26 @@ TURN_DEGREES = 360.0
 
 AXIS_WORDS = frozenset({*AXIS_LETTERS, *(f"I{letter}" for letter in AXIS_LETTERS)})
 LATE = frozenset({0, 1, 2, 5, 6, 9, 30, 111, 115, 117, 127, 129, 135, 137, 145, 149})
-"""M codes that act at the end of their block: they belong on its last piece."""
+"""M codes that act at the end of their block, and so have to stand in its last piece."""
 
 FALLBACK = Word("L", Constant(10.0), Span(Anchor(-1, 0), Anchor(-1, 0)), Span(Anchor(-1, 0), Anchor(-1, 0)))
-"""Every Klartext block says itself how it moves; blocks of words alone are straight."""
+"""The default of `KlartextLayout.motion`: every Klartext block says itself how it moves; words alone are straight."""
 
 RELATIVE_POLE = re.compile(rb"(?im)\n[ \t]*/?[ \t]*\d*[ \t]*CC(?![A-Z])(?:[^\r\n;]*I[XYZ]|[ \t]*(?:;|\r?$))")
-"""A pole that counts from where the tool stands."""
+"""A CC whose pole counts from where the tool stands."""
 
 
 @frozen(kw_only=True)
 class KlartextLayout(Layout):
-    """The writable parts of a motion block; the words of its axes may be increments (IX), its R is that of CR.
+    """The parts of a motion block that can be rewritten; axis words may be incremental (IX), R is the radius of CR.
 
-    prefix    its block number, unless blocks that are put in get none, and block skip
-    name      its path function, as in `KlartextPlan.name`
-    function  where that is written, None in a block of words alone
-    polar     PR, PA, IPR, IPA words
-    sense     DR+ or DR-
+    prefix    block skip, and the block number if blocks that are put in get one, too
+    name      path function, as in `KlartextPlan.name`
+    function  where the path function is written; None in a block of words alone
+    polar     the words PR, PA, IPR, IPA
+    sense     where DR+ or DR- is written; None without
     corner    the block before or after it is a corner that the control makes (RND, CHF)
-    motion    the block says itself which kind of motion it is
+    motion    see `FALLBACK`
     """
 
     prefix: Span
@@ -71,7 +71,7 @@ class KlartextLayout(Layout):
 
 
 def layout_of(program: Program, block: int) -> KlartextLayout | None:
-    """The layout of a block; None for an angle from a Q parameter, or half a direction of the tool."""
+    """The layout of a block; None if it cannot be rewritten: IPA from a Q parameter, or not all of TX TY TZ."""
     shape = Shape(program.template_of(block))
     found = _of_shape(shape)
     if found is None:
@@ -82,7 +82,7 @@ def layout_of(program: Program, block: int) -> KlartextLayout | None:
 
 
 class Shape:
-    """A template as a key: two are the same only if they are one."""
+    """A template as a dictionary key, compared by identity."""
 
     __slots__ = ("template",)
 
@@ -98,7 +98,7 @@ class Shape:
 
 @lru_cache(maxsize=4096)
 def _in_place(shape: Shape, blank: str, corner: bool, numbered: bool) -> KlartextLayout | None:
-    """The layout of blocks of a shape that have the rest in common, too."""
+    """The layout of blocks of a shape, with blanks, corner and block numbers as given."""
     found = _of_shape(shape)
     if found is None:
         return None
@@ -109,7 +109,7 @@ def _in_place(shape: Shape, blank: str, corner: bool, numbered: bool) -> Klartex
 
 @lru_cache(maxsize=4096)
 def _of_shape(shape: Shape) -> tuple[KlartextLayout, Word | None] | None:
-    """What all blocks of a shape have in common of their layout, and the last word that leads somewhere."""
+    """The part of the layout that all blocks of a shape share, and the last axis or polar word; None as `layout_of`."""
     items = shape.template.items
     words, commands = own_words(items), [item for item in items if isinstance(item, Command)]
     function = next((command for command in commands if opens_block(command.name)), None)
@@ -150,7 +150,7 @@ def acts_late(word: Word) -> bool:
 
 
 def start_of(items: Sequence[Item]) -> Anchor:
-    """Where the block begins behind its number and block skip."""
+    """Where the code of a block begins, after block skip and block number."""
     begins = (item.span.start for item in items if not (isinstance(item, Skip) or is_number(item)))
     return next(begins, Anchor(START, 0))
 
@@ -167,7 +167,7 @@ def is_corner(program: Program, block: int, way: int) -> bool:
 
 
 def beside_corners(program: Program) -> Mask:
-    """(n,) blocks before or behind RND or CHF: as `is_corner` says of each."""
+    """(n,) blocks directly before or after RND or CHF in the path (see `is_corner`)."""
     found = np.zeros(len(program), dtype=np.bool_)
     shapes = [_in_path(Shape(template)) for template in program.templates]
     if any(corner for _, corner in shapes):
@@ -180,10 +180,10 @@ def beside_corners(program: Program) -> Mask:
 
 
 def words_alone_turn(program: Program) -> Mask:
-    """(n,) blocks in which rotary axes get no word unless there is one for some of them.
+    """(n,) blocks in which a rotary axis gets a word only if some rotary axis already has one.
 
-    All in a program with tilted planes: the control would not keep the tip where it is. Paths that are made in a plane,
-    or lead to or away from one.
+    All blocks of a program with tilted planes are such: there the control would not keep the tip in place. In other
+    programs all but straight motions are, and motions beside a corner.
     """
     if tilts(program.source):
         return np.ones(len(program), dtype=np.bool_)
@@ -194,7 +194,7 @@ def words_alone_turn(program: Program) -> Mask:
 
 @lru_cache(maxsize=4096)
 def _in_path(shape: Shape) -> tuple[bool, bool]:
-    """Whether blocks of a shape stand between elements of the path, and whether they are corners."""
+    """Whether blocks of a shape are no elements of the path (poles, remarks), and whether they are corners."""
     items = shape.template.items
     names = (item.name if isinstance(item, Command) else getattr(item, "address", "") for item in items)
     pole = any(isinstance(item, Command) and item.name == "cc" for item in items)
@@ -202,18 +202,18 @@ def _in_path(shape: Shape) -> tuple[bool, bool]:
 
 
 def is_remark(item: Item) -> bool:
-    """A comment, a structuring remark, the block number, block skip."""
+    """Whether an item moves nothing: a comment, a structuring remark, the block number, or block skip."""
     structure = isinstance(item, Opaque) and item.kind == "structure"
     return structure or is_number(item) or isinstance(item, (Comment, Skip))
 
 
 def is_number(item: Item) -> bool:
-    """The block number."""
+    """Whether an item is the block number."""
     return isinstance(item, Word) and item.address == "N"
 
 
 def separator(program: Program, block: int, word: Word | None) -> str:
-    """The blanks before the last word."""
+    """The blanks before a word; one blank if there is no such word."""
     if word is None:
         return " "
     at = program.position(block, word.span.start)
@@ -224,14 +224,14 @@ def separator(program: Program, block: int, word: Word | None) -> str:
 
 
 def uses_comma(source: bytes) -> bool:
-    """Whether a program writes decimal commas and no points in its motion blocks."""
+    """Whether more axis words of a program have decimal commas than points."""
     commas, points = axis_numbers(source)
     return commas > points
 
 
 @lru_cache(maxsize=4)
 def axis_numbers(source: bytes) -> tuple[int, int]:
-    """How many words of axes have a decimal comma, and how many a point; the latter are not counted if none has."""
+    """The number of axis words with a decimal comma, and of those with a point; the latter is 0 if none has a comma."""
     commas = len(re.findall(rb"[XYZABC][+-]?\d*,\d", source)) if b"," in source else 0
     return commas, len(re.findall(rb"[XYZABC][+-]?\d*\.\d", source)) if commas else 0
 
@@ -244,5 +244,5 @@ def tilts(source: bytes) -> bool:
 
 @lru_cache(maxsize=4)
 def poles_move(source: bytes) -> bool:
-    """Whether some pole counts from where the tool stands, and so moves with its correction."""
+    """Whether any pole of a program counts from where the tool stands, and so moves when that is corrected."""
     return RELATIVE_POLE.search(b"\n" + in_lines(source)) is not None

@@ -1,9 +1,9 @@
-"""What a block does, worked out once per shape: its words as functions of its numbers, its codes, its flow.
+"""What the blocks of each shape do: their words as functions of their numbers, M codes, flow; and Q parameters.
 
-Q parameters: their values, and the formulas of Klartext.
+A parameter that the program has not set holds what an earlier program left in it. It is known only at run time, and so
+is everything that is computed from it. Angles in formulas are degrees.
 
-Source: TNC 640 user's manual, "Q parameters"; angles are degrees. A parameter that the program has not set holds
-whatever an earlier program left in it: it is known only at run time, and so is all that is computed from it.
+Source: TNC 640 user's manual, "Q parameters".
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ncfix.values import frozen, mutable
 
 PATH_FUNCTIONS = frozenset({"l", "lp", "ln", "c", "cp", "cr", "ct", "ctp", "cc", "rnd", "chf"})
 OPENING = ("tool ", "cycl ", "plane ", "trans ", "appr ", "dep ")
-"""The words with which a block begins, if it is not words alone."""
+"""How the names of other blocks begin that are no blocks of words alone."""
 
 LETTERS = frozenset("XYZABCUVW")
 OWN_WORDS = {
@@ -43,27 +43,28 @@ OWN_WORDS = {
     128: frozenset("F"),
     140: frozenset({"MB", "F"}),
 }
-"""M code -> the addresses of words after it that are its own: limits of the handwheel, a feed, a distance."""
+"""M code -> the addresses of words after it that belong to it: limits of the handwheel, a feed, a distance."""
 
 EQUAL = 1e-9
-"""Two numbers are equal that differ by less."""
+"""Two numbers that differ by less than this count as equal."""
 
 
 @frozen
 class KlartextPlan:
-    """One shape.
+    """What the blocks of one shape do.
 
     name         what the block begins with: `l`, `cycl def 200`, `plane spatial`; empty for words alone
-    words        address -> its value, of the words of the motion
-    codes        M codes, each with the words that are its own
+    words        address -> value, for the words of the motion
+    codes        M codes, each with the words that belong to it
     flags        words without values: `fmax`, `r0`, `dr+`, `stay`; `axis c` of M94 and M138
-    assignments  Q parameter -> its value
-    flow         label, call or condition; `test` is the condition's value
+    assignments  (Q parameter, its value) for each that the block sets
+    flow         label, call or condition
+    test         the value of the condition
     tool         the name of a tool, or the value of its number
-    statement    the span of a statement that is not taken apart, and its kind
+    statement    kind and place of a statement whose text the grammar does not analyse
     spans        address -> where the word stands
-    skip         the switches of block delete that it begins with: `/` is the only one
-    moves        the block leads somewhere: by its words, or by its path function alone
+    skip         block skip, `/`, at the beginning of the block
+    moves        the block leads somewhere, by its words or by its path function alone
     empty        the block does nothing
     """
 
@@ -83,29 +84,29 @@ class KlartextPlan:
 
 
 CORNERS = frozenset({"RND", "CHF"})
-"""Words that are a path function by themselves."""
+"""Addresses of words that are path functions themselves."""
 
 STATEMENTS = frozenset({"program", "statement", UNREAD})
-"""Kinds of text that is not taken apart."""
+"""Kinds of text that the grammar does not analyse."""
 
 CARTESIAN = frozenset(letter for axis in "XYZABCUVW" for letter in (axis, "I" + axis))
 POLAR = frozenset({"PA", "IPA", "PR", "IPR"})
 VECTOR = frozenset({"TX", "TY", "TZ"})
 MOVING = CARTESIAN | POLAR | VECTOR
-"""The addresses that lead somewhere."""
+"""The addresses that say where a motion leads."""
 
 SIZES = frozenset({"R", "LEN", "CCA"})
-"""The radius of an arc, the length of a line of an approach, and the angle about the centre."""
+"""Addresses of sizes: the radius of an arc, the length of a line (APPR, DEP), the angle about a centre."""
 
 ALWAYS_MOVING = frozenset({"c", "cp", "cr", "ct", "ctp", "ln"})
-"""Path functions that move even where they name no end: `C DR-` is a full circle."""
+"""Path functions that move even without words for their end: `C DR-` is a full circle."""
 
 LEADING = ("appr ", "dep ", "cycl call")
-"""How other blocks begin that lead somewhere, or drill where the tool stands."""
+"""How the names of other blocks begin that move the tool, if only to drill where it stands."""
 
 
 def owners(items: Sequence[Item]) -> dict[int, int]:
-    """Words that belong to an M code before them (`M118 X1 Y1`), not to the motion: place of the item -> that code."""
+    """Place of an item -> M code, for words that belong to an M code before them (`M118 X1 Y1`), not to the motion."""
     found: dict[int, int] = {}
     code = -1
     for place, item in enumerate(items):
@@ -118,18 +119,18 @@ def owners(items: Sequence[Item]) -> dict[int, int]:
 
 
 def opens_block(name: str) -> bool:
-    """Whether a block begins with this, so that it is no block of words alone."""
+    """Whether a name is that of a block that is more than words alone."""
     return name in PATH_FUNCTIONS or name.startswith(OPENING)
 
 
 def own_words(items: Sequence[Item]) -> list[Word]:
-    """The words of the block itself: not its number, and not what belongs to M codes."""
+    """The words of a block without its number and those that belong to M codes."""
     owned = owners(items)
     return [w for place, w in enumerate(items) if isinstance(w, Word) and w.address != "N" and place not in owned]
 
 
 def codes_of(items: Sequence[Item]) -> tuple[tuple[int, Mapping[str, Evaluate]], ...]:
-    """The M codes, each with the words that are its own."""
+    """The M codes of a block, each with the words that belong to it."""
     owned = owners(items)
     codes: list[tuple[int, dict[str, Evaluate]]] = []
     for place, item in enumerate(items):
@@ -142,18 +143,18 @@ def codes_of(items: Sequence[Item]) -> tuple[tuple[int, Mapping[str, Evaluate]],
 
 
 def assigned(item: Assignment) -> tuple[str, Evaluate]:
-    """The Q parameter that is set, and its value."""
+    """The Q parameter that an assignment sets, and the value."""
     assert isinstance(item.target, NamedParameter), "this family has no arrays"
     return item.target.name, compiled(item.value)
 
 
 def is_motion_word(word: Word) -> bool:
-    """Whether a word is one of the motion: no M code, and not what TOOL CALL and TOOL DEF name."""
+    """Whether a word belongs to the motion: it is neither an M code nor the tool of TOOL CALL and TOOL DEF."""
     return word.address != "TOOL" and not (word.address == "M" and isinstance(word.value, Constant))
 
 
 def tool_of(words: Sequence[Word]) -> str | Evaluate | None:
-    """The name of the tool that the block names, or the value of its number."""
+    """The name of the tool in a block, or the value of its number; None without a tool."""
     value = next((word.value for word in words if word.address == "TOOL"), None)
     if value is None:
         return None
@@ -190,11 +191,11 @@ def plan_of(template: Template) -> KlartextPlan:
 
 @mutable
 class QParameters:
-    """The Q parameters; QL parameters belong to one program, the others to all.
+    """The Q parameters; QL parameters belong to one program, the others to all programs.
 
-    values   those that the program has set, or the setup gives
-    read     those that the program has read or measured, so that no setup gives them
-    changes  how often a parameter has got another value
+    values   parameter -> value, for those that the program has set or the setup gives
+    read     parameters that the program has read from the control or measured, so that no setup can give them
+    changes  how often a parameter has changed its value
     """
 
     values: dict[str, Value] = field(default_factory=dict)
@@ -215,11 +216,11 @@ class QParameters:
             self.values[name] = Unknown(value.why or name, number)
 
     def enter(self) -> dict[str, Value]:
-        """A program is called: it has QL parameters of its own. Returns those of the caller, for `leave`."""
+        """Enter a called program, which has QL parameters of its own; returns those of the caller, for `leave`."""
         return {name: self.values.pop(name) for name in [name for name in self.values if name.startswith("QL")]}
 
     def leave(self, own: Mapping[str, Value]) -> None:
-        """The called program is over."""
+        """Leave a called program; `own`: the QL parameters of the caller, from `enter`."""
         self.enter()
         for name, value in own.items():
             self.assign(name, value)
@@ -227,7 +228,12 @@ class QParameters:
 
 @mutable
 class FormulaScope:
-    """What a formula may refer to: the numbers of the program, where those of the block begin, and the parameters."""
+    """What a formula may refer to.
+
+    numbers     the numbers of the program
+    first       the place among them at which the numbers of the block begin
+    parameters  the Q parameters
+    """
 
     numbers: Sequence[float] = ()
     first: int = 0
@@ -247,7 +253,7 @@ OPERATORS: dict[str, Callable[[float, float], float]] = {
     "gt": lambda a, b: float(a > b),
     "lt": lambda a, b: float(a < b),
 }
-"""`a ANG b` is the angle whose sine side is `a` and whose cosine side is `b`."""
+"""Operator -> what it computes; `a ANG b` is the angle whose opposite side is `a` and whose adjacent side is `b`."""
 
 FUNCTIONS_OF_FORMULAS: dict[str, tuple[Callable[..., float], int]] = {
     **FUNCTIONS,
@@ -275,7 +281,7 @@ class QExpressions(Expressions):
     impossible = "{} cannot be computed here"
 
     def text(self, text: str) -> Evaluate:
-        """A string, or a word such as AUTO: no number."""
+        """A string, or a word such as AUTO, which has no number."""
         return lambda scope: Unknown(text)
 
     def named(self, name: str) -> Evaluate:

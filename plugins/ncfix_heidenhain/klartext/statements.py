@@ -1,6 +1,7 @@
-"""Statements that are known by their first words, M codes that matter to where the tool goes, TOOL CALL and TOOL DEF.
+"""Statements, which are told apart by their first words; M codes; TOOL CALL and TOOL DEF; and the program flow.
 
-Labels, calls, repeats and jumps become operations of the program flow; other statements move nothing, or are refused.
+Labels, calls, repeats and jumps become operations of the program flow. Statements that are not listed here move
+nothing.
 """
 
 from __future__ import annotations
@@ -35,14 +36,14 @@ from ncfix_heidenhain.klartext.units import KlartextUnit
 
 NO_LABEL = "NCF276"
 PROGRAM = "program"
-"""The kind of calls of other programs."""
+"""The kind of an open call of another program."""
 
 
 class KlartextFlow(ProgramFlow[KlartextUnit]):
     """Where the control is in the program.
 
-    find      gives a program by its name
-    selected  the program that CALL SELECTED PGM calls; empty where it is chosen at run time
+    find      returns the program of a name, None if it is not found
+    selected  the program that CALL SELECTED PGM calls; empty if that is known only at run time
     """
 
     most_calls = 64
@@ -57,7 +58,7 @@ class KlartextFlow(ProgramFlow[KlartextUnit]):
         self.selected = ""
 
     def operations(self, plan: KlartextPlan, holds: Callable[[], bool]) -> tuple[Operation, ...]:
-        """What a label, a call or a condition comes down to; `holds`: the condition is met."""
+        """The operations of a block with a label, a call or a condition; `holds` tells whether the condition is met."""
         assert plan.flow is not None
         label, unit = str(plan.flow.label), self.unit
 
@@ -78,7 +79,7 @@ class KlartextFlow(ProgramFlow[KlartextUnit]):
         return ()
 
     def call_program(self, name: str) -> None:
-        """CALL PGM: another program, with QL parameters of its own."""
+        """CALL PGM: enter another program, which has QL parameters of its own."""
         found = self.find(name)
         if found is None:
             hint = "put its file beside the program, or say where it is: --subprograms DIR"
@@ -105,13 +106,13 @@ BESIDE_RETRACTION = (
     "M140 retracts the tool at the start of its block: where the words of axes beside it lead is not sure"
 )
 NAMED_AXES = frozenset({"axis a", "axis b", "axis c"})
-"""Words of M94 and M138."""
+"""Names of axes after M94 and M138."""
 
 COMPENSATION = {"r0": 0, "rl": 41, "rr": 42, "r+": 41, "r-": 42}
 
 
 def before_motion(control: KlartextControl, step: Step) -> None:
-    """What acts from the start of the block."""
+    """Execute what acts at the start of a block: radius compensation and some M codes."""
     for flag, side in COMPENSATION.items():
         if flag in step.flags:
             if not side:
@@ -142,9 +143,10 @@ def before_motion(control: KlartextControl, step: Step) -> None:
 
 
 def end_of_short_ways(control: KlartextControl) -> None:
-    """M127 after M126: an axis that went past a turn may count from there, or from the angle below a turn.
+    """M127 after M126: the position of an axis that went past a turn is not known any more.
 
-    M126 means nothing to an axis that cannot go round, as the one that tilts the tool: it may stand below zero.
+    The control may keep counting past a turn, or reduce the angle to below one. The axis that tilts the tool cannot go
+    round, so M126 means nothing to it: it may stand below zero.
     """
     pointing = control.posture.pointing if control.shortest else None
     tilts = None if pointing is None else control.axis_indices[pointing.columns[1]]
@@ -156,7 +158,7 @@ def end_of_short_ways(control: KlartextControl) -> None:
 
 
 def choose_axes(control: KlartextControl, flags: frozenset[str]) -> None:
-    """M138: the rotary axes that tilted planes and control of the tip take into account, those of the machine again."""
+    """M138: corrections are suspended if the control takes only some rotary axes into account, and resume with all."""
     control.resume("M138")
     turning = {f"axis {LETTERS[index].lower()}" for index in control.turning}
     if flags & NAMED_AXES not in (set(), turning):
@@ -164,13 +166,13 @@ def choose_axes(control: KlartextControl, flags: frozenset[str]) -> None:
 
 
 def tip_control(control: KlartextControl, *, on: bool) -> None:
-    """M128 and M129, FUNCTION TCPM."""
+    """Turn tool centre point control on or off (M128, M129, FUNCTION TCPM)."""
     control.m128 = on
     control.switch_tip()
 
 
 def after_motion(control: KlartextControl, code: int, own: MotionWords, flags: frozenset[str]) -> None:
-    """What acts at the end of the block."""
+    """Execute an M code that acts at the end of a block; `own`: the words that belong to it."""
     if code == 129:
         tip_control(control, on=False)
         control.path.by_vector = control.path.spatial = False
@@ -186,7 +188,7 @@ def after_motion(control: KlartextControl, code: int, own: MotionWords, flags: f
 
 
 NAMED = -1
-"""The number that stands for a tool that is called by name."""
+"""The number of a tool that is called by name."""
 
 OTHER_AXIS = "the tool axis is {}: only tools along Z are followed"
 OVERSIZE = "whether the oversize (DL) stays in force where TOOL CALL names no tool is not certain"
@@ -196,7 +198,7 @@ AT_RUN_TIME = "the length of the tool is known only at run time"
 def define_tool(
     control: KlartextControl, tool: str | float | Unknown | None, words: MotionWords, flags: frozenset[str]
 ) -> None:
-    """TOOL DEF: the length of a tool, where the program brings it. A number of run time may be that of any tool."""
+    """TOOL DEF: note length and radius of a tool. A tool number known only at run time makes all of them unknown."""
     if isinstance(tool, Unknown) and "L" in words.values:
         control.defined_tools = dict.fromkeys(control.defined_tools, Tool())
     if isinstance(tool, float) and "L" in words.values:
@@ -208,7 +210,10 @@ def define_tool(
 def call_tool(
     control: KlartextControl, tool: str | float | Unknown | None, words: MotionWords, flags: frozenset[str]
 ) -> None:
-    """TOOL CALL: without a number only speed, feed or oversizes are new; one of run time counts as a name."""
+    """TOOL CALL: change the tool. Without a tool only speed, feed or oversizes change.
+
+    A tool number that is known only at run time counts as a name.
+    """
     if isinstance(tool, Unknown):
         tool = tool.why
     if "F" in words.values:
@@ -246,7 +251,10 @@ def call_tool(
 
 
 def tell_radius(control: KlartextControl, oversize: float) -> None:
-    """Q108 is the radius of the active tool, in the unit of the program; and contours are offset by it."""
+    """Note the radius of the active tool, by which contours are offset, and set Q108 to it in program units.
+
+    oversize  DR, program units
+    """
     number = int(control.tools.spindle)
     defined = control.defined_tools.get(number, Tool())
     radius = control.knowledge.known_tool_radius(number)
@@ -257,7 +265,7 @@ def tell_radius(control: KlartextControl, oversize: float) -> None:
 
 
 def set_length(control: KlartextControl, length: float) -> None:
-    """The machine stands still when the length of the tool changes; the tip does not."""
+    """Change the length of the active tool, mm: the machine stands still, so the tip moves."""
     tool = zeros()
     tool[Z] = length
     if control.tcp:
@@ -267,7 +275,7 @@ def set_length(control: KlartextControl, length: float) -> None:
 
 
 def length_by_name(control: KlartextControl, name: str) -> float:
-    """The length of a tool that is called by its name, mm; zero if it is lacking."""
+    """The length of a tool that is called by name, mm; zero if the setup does not give it."""
     named = control.setup.tool_called(name)
     if named is not None and named.length is not None:
         return named.length
@@ -276,7 +284,7 @@ def length_by_name(control: KlartextControl, name: str) -> float:
 
 
 def length_of(control: KlartextControl, number: int) -> float:
-    """The length of a tool, mm: as the setup has it, else as the program defines it; tool 0 has none."""
+    """The length of a tool, mm: that of the setup, else that of TOOL DEF; zero for tool 0."""
     known = control.knowledge.known_tool_length(number)
     if known is not None:
         return known
@@ -289,10 +297,13 @@ def length_of(control: KlartextControl, number: int) -> float:
 PROBING = Passing(Pass.PROBING, "probing")
 MEASURED = "TCH PROBE {} makes what it measures the datum, a rotation or the kinematics: that is known only at run time"
 SETTING = frozenset({*range(400, 406), *range(408, 420), *range(450, 454), *range(1400, 1500)})
-"""Probing cycles that do not only measure. Those from 500 on are of builders and of probes' makers."""
+"""Probing cycles that not only measure but set a datum, a rotation or the kinematics.
+
+Cycles from 500 on come from machine builders and makers of probes.
+"""
 
 OF_THE_TOOL = frozenset({31, 33, 481, 483, *range(580, 590)})
-"""Cycles that measure the length of the tool in the spindle."""
+"""Probing cycles that measure the length of the tool in the spindle."""
 
 TOOL_MEASURED = "NCF281"
 LENGTH_MEASURED = "TCH PROBE {} measures the tool, and its length in the setup is taken to be what the control finds"
@@ -301,17 +312,17 @@ OTHER_POINT = "FUNCTION TCPM with a reference point other than the tip"
 SELECTED = "PRESET SELECT by a parameter, with other words, or while coordinates are transformed, is not followed"
 ERROR = "NCF278"
 PROBED = range(100, 200)
-"""The Q parameters in which probing cycles and the control itself leave results."""
+"""The Q parameters in which probing cycles and the control store results."""
 
 IN_A_ROW = 4
-"""So many parameters, from the one that is named, an old probing cycle (0 to 4) may write."""
+"""The number of parameters, from the one that it names, that an old probing cycle (0 to 4) may write."""
 
 TARGET = re.compile(r"(Q[LRS]?)(\d+)", re.IGNORECASE)
 CIRCLE = re.compile(r"FN\s*2[34]\b", re.IGNORECASE)
 
 
 def statement(control: KlartextControl, flow: KlartextFlow, text: str) -> None:
-    """Do what a statement says; one that is not listed moves nothing."""
+    """Execute a statement; one that is not listed in `STATEMENTS` moves nothing."""
     for form, do in STATEMENTS:
         if found := form.match(text):
             do(control, flow, found)
@@ -322,13 +333,13 @@ def statement(control: KlartextControl, flow: KlartextFlow, text: str) -> None:
 
 
 def select_program(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
-    """SEL PGM: the program that CALL SELECTED PGM calls; one whose name is in a parameter is known only at run time."""
+    """SEL PGM: note the program for CALL SELECTED PGM; a name in a parameter is known only at run time."""
     name = match["name"].strip()
     flow.selected = "" if TARGET.fullmatch(name) else name
 
 
 def call_selected(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
-    """CALL SELECTED PGM."""
+    """CALL SELECTED PGM: call the program that SEL PGM chose."""
     if flow.selected:
         flow.call_program(flow.selected)
     else:
@@ -344,7 +355,7 @@ def error(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) ->
 
 
 def not_followed(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
-    """What may change coordinates, or what later blocks do."""
+    """Refuse the rest of the program: the statement may change coordinates, or what later blocks do."""
     name = " ".join(match[0].partition(":")[0].split()[:3]).upper()
     control.refuse_rest(f"{name} may change coordinates in a way that is not followed")
 
@@ -353,7 +364,7 @@ def not_followed(control: KlartextControl, flow: KlartextFlow, match: re.Match[s
 
 
 def probe(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
-    """TCH PROBE: the control moves on its own, and leaves results in Q parameters, or sets a datum by them."""
+    """TCH PROBE: the control moves by itself, stores results in Q parameters, and may set a datum by them."""
     number = int(match["number"])
     if number in OF_THE_TOOL:
         control.warn(TOOL_MEASURED, LENGTH_MEASURED.format(number), "give the length that the tool has when it cuts")
@@ -366,12 +377,12 @@ def probe(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) ->
 
 
 def read_values(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
-    """FN 18, 28 and their like put what they read into a Q parameter; FN 23 and 24 into three in a row."""
+    """FN functions that read: FN 18, 28 and the like write one Q parameter, FN 23 and 24 three in a row."""
     lose_parameters(control, match[0].partition("=")[0], 3 if CIRCLE.match(match[0]) else 1)
 
 
 def lose_parameters(control: KlartextControl, text: str, in_a_row: int) -> None:
-    """The Q parameters that a text names, and those behind them, are known only at run time."""
+    """Make Q parameters unknown: those that a text names, and from each on `in_a_row` of them."""
     for letters, number in TARGET.findall(text):
         for offset in range(in_a_row):
             control.scope.parameters.assign(f"{letters.upper()}{int(number) + offset}", Unknown())
@@ -381,7 +392,7 @@ def lose_parameters(control: KlartextControl, text: str, in_a_row: int) -> None:
 
 
 def holes(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
-    """PATTERN DEF; the holes of SEL PATTERN are in a table that is not read."""
+    """PATTERN DEF: note the places of the holes. Those of SEL PATTERN are in a table that is not read."""
     control.cycle.places = pattern_of(match[0], control.scope.parameters)
 
 
@@ -391,9 +402,10 @@ def is_untransformed(control: KlartextControl) -> bool:
 
 
 def select_preset(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
-    """PRESET SELECT: a row of the preset table; it ends transformations, unless it is told to keep some.
+    """PRESET SELECT: activate a row of the preset table.
 
-    A row that a parameter says (#Q1) is not followed.
+    It ends transformations unless its words keep some. So it is followed only without such words, without active
+    transformations, and with a plain number for the row (not `#Q1`).
     """
     control.resume(PRESET)
     if match["row"] is None or match["rest"].strip() or control.doubtful or not is_untransformed(control):
@@ -403,7 +415,7 @@ def select_preset(control: KlartextControl, flow: KlartextFlow, match: re.Match[
 
 
 def tcpm(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
-    """FUNCTION TCPM and FUNCTION RESET TCPM."""
+    """Execute FUNCTION TCPM and FUNCTION RESET TCPM."""
     control.resume("tcpm")
     control.resume(SPATIAL_MODE)
     words = "" if match["reset"] else " ".join(match["rest"].upper().split())
@@ -439,4 +451,4 @@ FORMS: tuple[tuple[str, Do], ...] = (
     (r"(FUNCTION|FN\s*(17|25)\b|SEL\s+CYCLE|POLARKIN|TCH\s*PROBE).*", not_followed),
 )
 STATEMENTS = tuple((re.compile(form, re.IGNORECASE | re.DOTALL), do) for form, do in FORMS)
-"""Statements by their first words, and what they do."""
+"""Pattern of a statement, and what executes it; the first that matches counts."""
