@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from ncfix.control.coordinates import INDEX, LETTERS, TURN, Vector, mask_of
+from ncfix.control.coordinates import INDEX, LETTERS, TURN, Vector, mask_of, zeros
 from ncfix.control.expressions import Fault
-from ncfix.control.moves import MotionEnd, UnknownAxes
-from ncfix.control.tcp import led_in_machine
-from ncfix_siemens.sinumerik.state import Sinumerik
+from ncfix.control.moves import MotionEnd, TcpState, UnknownAxes
+from ncfix.control.tcp import ALIKE, converted, led_in_machine
+from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, HALF_A_TURN, POLAR, SHORTEST_WAY, TURNING, BlockWordValues
 
 RUNTIME = "where the axis {} stands is known only at run time"
@@ -26,6 +26,12 @@ STILL = 1e-9
 """Largest difference of equal angles, rad."""
 INCREMENT_IN_PLANE = (
     "where the axis {} stands after increments in machine coordinates in a swivelled plane is not followed"
+)
+TOOL_OFF = "$mn_g53_toolcorr"
+"""Machine data 10760: 0, the tool stays on in machine coordinates; 1, it is taken off. A control may have either."""
+TOOL_ON_OR_OFF = (
+    "where the axis {} stands after SUPA or G53 with a tool length on is for machine data: "
+    f'variables."{TOOL_OFF.upper()}" = 0 (it stays on) or 1 (it does not) in the setup file; or D0 in that block'
 )
 
 
@@ -198,9 +204,10 @@ def where_it_stands(control: Sinumerik) -> tuple[float, float] | None:
 
 
 def machine_destination(control: Sinumerik, words: BlockWordValues) -> MotionEnd:
-    """The command at the end of a motion in machine coordinates (SUPA, G53, G153): without frames, with tool length.
+    """The command at the end of a motion in machine coordinates (SUPA, G53, G153): without frames.
 
-    A swivelled plane is a frame: without it the words are positions of the machine axes. With TRAORI they remain those
+    Machine data say whether the tool length is on. Where they are not given, axes for which it matters are unknown. A
+    swivelled plane is a frame: without it the words are positions of the machine axes. With TRAORI they remain those
     of the tip.
     """
     if POLAR & words.values.keys():
@@ -208,31 +215,57 @@ def machine_destination(control: Sinumerik, words: BlockWordValues) -> MotionEnd
     if control.tcp and not (control.modes.transformed or control.setup.tcp):
         end = led_in_machine(control, *axes_of_machine(control, words))
         return MotionEnd(end.target, end.unknown, control.along_frame(end.unknown), end.in_machine)
-    target, unknown = control.position[:], dict(control.unknown)
-    for letter in LETTERS:
-        if letter in words.values:
-            place_at_machine(control, words, letter, target, unknown)
+    target, unknown = placed_at_machine(control, words, control.position[:], dict(control.unknown), control.tool_shift)
+    without, lost, known = control.position[:], dict(control.unknown), True
+    on, off = TcpState(control.tcp, control.length_under_tcp), TcpState(control.tcp, 0.0)
+    if control.tcp:
+        known = converted(control, without, lost, on, off)
+    without, lost = placed_at_machine(control, words, without, lost, zeros())
+    if control.tcp:
+        known = converted(control, without, lost, off, on) and known
+    toolless = control.variables.value(TOOL_OFF)
+    for index in GEOMETRY if on.tool_length or not control.tcp else ():
+        if index not in control.axis_indices or toolless == 0.0:
+            continue
+        if not known or abs(target[index] - without[index]) > ALIKE:
+            target[index] = without[index]
+            if not known or toolless != 1.0:
+                unknown[index] = TOOL_ON_OR_OFF
     return MotionEnd(target, unknown, control.along_frame(unknown))
 
 
 def axes_of_machine(control: Sinumerik, words: BlockWordValues) -> tuple[dict[int, float], UnknownAxes]:
-    """Machine axis positions by the words, mm and rad, with tool length; and reasons for unknown ones, by axis."""
+    """Machine axis positions by the words, mm and rad; and reasons for unknown ones, by axis."""
     axes, unsure = dict[int, float](), dict[int, str]()
+    toolless = control.variables.value(TOOL_OFF)
     for letter in LETTERS:
         if letter in words.values:
             index, value = INDEX[letter], words.values[letter]
-            axes[index] = control.tools.vector[index] + step_of(control, letter, value)
+            length = control.tools.vector[index]
+            axes[index] = step_of(control, letter, value) + (0.0 if toolless == 1.0 else length)
             if value is None:
                 unsure[index] = RUNTIME
             elif control.counts_on(words.forms.get(letter, "")):
                 unsure[index] = INCREMENT_IN_PLANE
+            elif length and toolless not in (0.0, 1.0):
+                unsure[index] = TOOL_ON_OR_OFF
     return axes, unsure
 
 
+def placed_at_machine(
+    control: Sinumerik, words: BlockWordValues, target: Vector, unknown: UnknownAxes, tool: Vector
+) -> tuple[Vector, UnknownAxes]:
+    """Take the axis words of a block in machine coordinates into `target` and `unknown`; `tool` is what is on then."""
+    for letter in LETTERS:
+        if letter in words.values:
+            place_at_machine(control, words, letter, target, unknown, tool)
+    return target, unknown
+
+
 def place_at_machine(
-    control: Sinumerik, words: BlockWordValues, letter: str, target: Vector, unknown: UnknownAxes
+    control: Sinumerik, words: BlockWordValues, letter: str, target: Vector, unknown: UnknownAxes, tool: Vector
 ) -> None:
-    """Apply one axis word in machine coordinates to the position `target`."""
+    """Apply one axis word in machine coordinates to the position `target`; `tool`: the length along each axis there."""
     index, value = INDEX[letter], words.values[letter]
     if control.counts_on(words.forms.get(letter, "")):
         target[index] += step_of(control, letter, value)
@@ -241,7 +274,7 @@ def place_at_machine(
         if why := control.unsteady(index, by_machine=True):
             unknown[index] = why
     else:
-        target[index] = control.tool_shift[index] + step_of(control, letter, value)
+        target[index] = tool[index] + step_of(control, letter, value)
         unknown.pop(index, None)
     if value is None:
         unknown[index] = RUNTIME

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ncfix.compensate.following import kinematics_of
-from ncfix.control.moves import Rule
+from ncfix.control.moves import Rule, TcpState
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import SourceError, UsageError
 from ncfix.machine.file import load
@@ -246,11 +246,45 @@ def test_a_scale_that_differs_from_axis_to_axis_is_refused() -> None:
     assert followed.moves.rule.tolist() == [Rule.REFUSE, Rule.CORRECT]
 
 
-def test_machine_coordinates_pass_and_keep_the_tool_length() -> None:
-    setup = Setup(work_offsets=KNOWN.work_offsets, tools={5: Tool(100.0)}, initial=ZERO)
-    followed = follow("T5 M6\nG54 G0 Z0\nSUPA Z0\nD0\nSUPA Z0", setup=setup)
-    assert [row[2] for row in ends(followed)] == [100, 100, 0]
-    assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.PASS, Rule.PASS]
+@pytest.mark.parametrize(("tool_off", "end"), [(None, None), (0.0, 100), (1.0, 0), (2.0, None)])
+def test_machine_data_say_whether_the_tool_length_stays_on_in_machine_coordinates(
+    tool_off: float | None, end: float | None
+) -> None:
+    given = {} if tool_off is None else {"$MN_G53_TOOLCORR": tool_off}
+    setup = Setup(work_offsets=KNOWN.work_offsets, tools={5: Tool(100.0)}, initial=ZERO, variables=given)
+    followed = follow("T5 M6\nG54 G0 Z0\nSUPA Z0\nSUPA X1 Y1\nG1 F9 X2\nZ0\nD0\nSUPA Z0\nG1 X3", setup=setup)
+    heights = [100, end, end, end, 100, 0, 0]
+    assert [row[2] for row in ends(followed)] == pytest.approx(
+        [math.nan if z is None else z for z in heights], nan_ok=True
+    )
+    cut = Rule.CORRECT if end is not None else Rule.REFUSE
+    assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.PASS, Rule.PASS, cut, cut, Rule.PASS, Rule.CORRECT]
+    assert all("$MN_G53_TOOLCORR" in why for why in reasons(followed)[3:5] if why)
+
+
+@pytest.mark.parametrize("name", ["angle_head", "wCAYFXZSt"])
+@pytest.mark.parametrize(("tilt", "words"), [(0, "X5 Y6"), (30, "X5 Y6 Z7"), (30, "Z7"), (30, "A0"), (30, "Z7 D0")])
+def test_machine_coordinates_mean_the_tip_of_the_tool_or_of_one_without_length(
+    name: str, tilt: float, words: str
+) -> None:
+    machine = load(f"examples/machines/{name}.toml")
+    axes, kinematics = "".join(machine.axis_names), kinematics_of(machine)
+    text = f"T1 D1\nTRAORI\nG0 X10 Y20 Z30 A{tilt} C0\nSUPA {words}"
+
+    def end(**given: float) -> np.ndarray:
+        setup = replace(KNOWN, tools={1: Tool(100.0)}, variables={"$MN_G53_TOOLCORR": given["tool_off"]})
+        return follow(text, axes, setup, kinematics=kinematics).moves.end[-1]
+
+    tip, without = end(tool_off=0.0), end(tool_off=1.0)
+    length = 0.0 if "D0" in words else 100.0
+    reference = kinematics(without.tolist(), TcpState(True, length), TcpState(True, 0.0))
+    for word in words.split():
+        if word[0] in "XYZ":
+            column = axes.index(word[0])
+            assert [tip[column], reference[column]] == pytest.approx([float(word[1:])] * 2)
+    alike = np.isclose(tip, without)
+    assert alike.all() == (tilt == 0 or "D0" in words)
+    assert (alike == ~np.isnan(end(tool_off=2.0))).all()
 
 
 def test_what_a_line_by_its_angle_leaves_out_is_not_known() -> None:
