@@ -7,6 +7,8 @@ import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect
 from compensate.motions import Arc, motions
+from ncfix.compensate import FixOptions
+from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.kinematics import carried, matters, signs
@@ -85,6 +87,35 @@ def test_with_tcp_the_axes_count_not_the_words() -> None:
     way = intent.direction(np.zeros(4, dtype=np.intp), f)
     np.testing.assert_array_equal(way, expected)
     assert set(way[:, 2].tolist()) == {-1, 1}, "the case has a reversal inside"
+
+
+BEGINS = "G21 G90 G94 G54\nG0 X5 Y5\nG0 Z9\n"
+
+
+@pytest.mark.parametrize(
+    ("cuts", "given", "tolerance", "said"),
+    [
+        ("G1 X9 F99\nX5\n", {}, 1.0, (4, "this cut begins", "10.0")),
+        ("G1 Z1 F99\nY9\nX9\nX5\n", {}, 1.0, (4, "this cut and 2 more begin", "10.0")),
+        ("G1 Z1 F99\n", {}, 1.0, (4, "this cut begins", "5.0")),
+        ("G1 Z1 F99\n", {}, 6.0, None),
+        ("G81 Z1 R2 F99\nX9\nY9\n", {}, 1.0, (4, "this cut begins", "5.0")),
+        ("G1 Z1 F99\nX9\n", {"X": 0.0}, 1.0, None),
+        ("G1 Z1 F99\nX9\n", {"X": 5.0}, 1.0, (4, "this cut and 1 more begin", "10.0")),
+        ("G0 X9\nG1 Z1 F99\nX9\n", {}, 1.0, None),
+        ("G28 X0\nG0 Y9\nX4\nG1 Z1 F99\n", {"X": 0.0}, 1.0, (7, "this cut begins", "5.0")),
+    ],
+)
+def test_cuts_that_begin_on_a_side_nobody_knows_are_counted(
+    cuts: str, given: dict[str, float], tolerance: float, said: tuple[int, str, str] | None
+) -> None:
+    """The tip is up to the play of 10 um off where X moves, and half of it where it rests in the middle."""
+    setup = Setup(work_offsets={"G54": {}}, initial={"Y": 0.0, "Z": 100.0, **given}, tools={0: Tool(50.0)})
+    program = read(f"{BEGINS}{cuts}M2\n".encode(), "part.ngc", "linuxcnc")
+    report = fix_program(program, with_play("w X Y F Z t"), setup, FixOptions(tolerance_um=tolerance)).report
+    found = [(each.place and each.place.line, each.text) for each in report.warnings if each.code == "NCF285"]
+    words = "{} where nobody knows on which side of its play X is: the tip may be up to {} um off there"
+    assert found == ([] if said is None else [(said[0], words.format(*said[1:]))])
 
 
 @pytest.mark.parametrize(("turned", "aside"), [("", 1), ("G68.2 X0. Y0. Z0. I90. J30. K-90.\nG53.1\n", -1)])

@@ -227,6 +227,16 @@ CODES = {
         "split to hold the tolerance it stops at the end of each piece, too, and the tool may leave a mark there.",
         "Program continuous path mode (G64) where no exact stop is needed, or ask for a larger tolerance.",
     ),
+    "NCF285": Code(
+        "a cut begins on a side of play that nobody knows",
+        "On an axis with play the body stays behind on the side from which it was last pulled. The program has not "
+        "moved this axis before the cut, or it comes from where nobody knows (the start of the program, a reference "
+        "point, machine coordinates). The axis is taken to be in the middle until it moves, and on the side of its "
+        "motion from there on: where it begins, the tip may be off by the play, or half of it where the axis rests. "
+        "The figures of the report do not know of it.",
+        "Move these axes farther than their play before the first cut, as an approach from a place that the program "
+        "names does; `--initial X=0` says where an axis comes from at the start.",
+    ),
     "NCF456": Code(
         "turns of rotary axes get inverse time",
         "F of a block that turns rotary axes alone is degrees per minute. Where its correction moves a linear axis, "

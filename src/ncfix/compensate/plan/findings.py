@@ -84,11 +84,14 @@ def pose_error(code: str, text: str, rows: Mask, hint: str = "") -> PoseError:
 
 ORDER = (
     *("NCF408", "NCF405", "NCF404", "NCF406", "NCF407"),
-    *("NCF414", "NCF402", "NCF403", "NCF415", "NCF454", "NCF413", "NCF455", "NCF456", "NCF283", "NCF409", "NCF410"),
+    *("NCF414", "NCF402", "NCF403", "NCF415", "NCF454", "NCF413", "NCF455", "NCF456", "NCF283", "NCF285", "NCF409"),
+    "NCF410",
 )
 """Codes in the order in which they are reported: those of limits, then those of a plan."""
 ONCE = frozenset({"NCF409", "NCF456", "NCF283"})
 """Codes that hold for the whole program, and are reported for its first motion only."""
+COUNTED = "NCF285"
+"""The code reported for the first cut, with the number of cuts, their axes, and the largest figure."""
 
 
 NoteKey = tuple[int, str, str, str]
@@ -97,10 +100,23 @@ NoteKey = tuple[int, str, str, str]
 
 @mutable
 class Found:
-    """The first few messages of one kind, and the number of all."""
+    """The first few messages of one kind, and the number of all; of counted ones axes and largest figure."""
 
     shown: list[Message] = field(default_factory=list)
     count: int = 0
+    axes: frozenset[str] = frozenset()
+    most: float = 0.0
+
+    def counted(self) -> Message:
+        """All of them as one message, at the first of them."""
+        axes, more = sorted(self.axes), self.count - 1
+        words = {
+            "cuts": f"this cut and {more} more begin" if more else "this cut begins",
+            "play": "their play" if axes[1:] else "its play",
+            "axis": " and ".join(filter(None, (", ".join(axes[:-1]), axes[-1]))),
+            "is_": "are" if axes[1:] else "is",
+        }
+        return replace(self.shown[0], text=self.shown[0].text.format(value=self.most, **words))
 
 
 @mutable
@@ -114,10 +130,14 @@ class Notes:
         rows = np.arange(len(finding)) if own is None else np.flatnonzero(own[finding.moves])
         rows = rows[:1] if finding.code in ONCE else rows
         shown = []
-        for k in rows[:MOST].tolist():
+        counted = finding.code == COUNTED
+        for k in rows[: 1 if counted else MOST].tolist():
             place = program.place(int(moves.block[finding.moves[k]]))
-            shown.append(Message(finding.code, finding.sentence(k), place, finding.hint))
-        self._take((position, finding.code, finding.text, finding.hint), Found(shown, len(rows)))
+            text = finding.text if counted else finding.sentence(k)
+            shown.append(Message(finding.code, text, place, finding.hint))
+        axes = frozenset("".join(finding.axes[k] for k in rows.tolist())) if counted else frozenset[str]()
+        most = float(finding.values[rows].max(initial=0.0))
+        self._take((position, finding.code, finding.text, finding.hint), Found(shown, len(rows), axes, most))
 
     def take(self, other: Notes) -> None:
         """Add the findings of a later part."""
@@ -130,11 +150,15 @@ class Notes:
         note = self.found.setdefault(key, Found())
         note.shown += found.shown[: max(MOST - note.count, 0)]
         note.count += found.count
+        note.axes, note.most = note.axes | found.axes, max(note.most, found.most)
 
     def messages(self) -> tuple[Message, ...]:
         """The messages, by position of block delete and in `ORDER`, without duplicates."""
         messages: list[Message] = []
         for (_, code, *_), note in sorted(self.found.items(), key=lambda each: (each[0][0], ORDER.index(each[0][1]))):
+            if code == COUNTED:
+                messages += [note.counted()] if note.count else []
+                continue
             messages += note.shown
             if note.count > MOST:
                 messages.append(Message(code, f"and {note.count - MOST} more motions like these"))

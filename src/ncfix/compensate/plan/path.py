@@ -128,6 +128,9 @@ def _shares(pieces: Pieces, real: Segments, counts: Index) -> Array:
     return share / np.repeat(sums(share, counts), counts)
 
 
+SIDE = "{cuts} where nobody knows on which side of {play} {axis} {is_}: the tip may be up to {value:.1f} um off there"
+SIDE_HINT = "before the first cut, move such axes farther than their play; --initial says where they come from"
+
 SAMPLED = 0.02
 """Share of the tolerance that is kept for errors between samples. There are at least `DENSITY` samples in the shortest
 distance over which the model bends, an eighth of a wave. The peak of a wave between two samples exceeds the higher of
@@ -379,6 +382,8 @@ def _remarks(
         hint = "give it as --tool NUMBER=LENGTH,RADIUS"
         remarks.append(Finding.of("NCF455", unknown, text, hint))
     done = np.flatnonzero(~unchanged)
+    if intent.came is not None and (unsure := _sides_unknown(intent, done, budget.tolerance)):
+        remarks.append(unsure)
     if not budget.fine and done.size:
         text = (
             "rounding to the control's digits alone moves the tool tip by up to {value:.2f} um, on top of the tolerance"
@@ -389,6 +394,33 @@ def _remarks(
         text = "the tool direction is not, or not fully, corrected here"
         remarks.append(Finding.of("NCF410", held, text))
     return remarks
+
+
+def _sides_unknown(intent: Intent, rows: Index, tolerance: float) -> Finding:
+    """NCF285: cuts among `rows` (k,) that begin with an axis of which nobody knows on which side of its play it is.
+
+    The figure is how far the tip may be off there, as far as it is more than the tolerance, mm: between the two sides
+    of an axis that moves, from the middle to a side for one that rests. A hole has its figure at its bottom.
+    """
+    assert intent.came is not None
+    assert intent.arrival is not None
+    holes = intent.moves.kind[rows] == MotionKind.CYCLE
+    known = finite(intent.moves.end[rows]) & (holes | finite(intent.moves.start[rows]))
+    rows, holes = rows[intent.moves.cutting[rows] & known], holes[intent.moves.cutting[rows] & known]
+    place = holes.astype(np.float64)
+    q = np.where(holes[:, None], intent.ends[1][rows], intent.ends[0][rows])
+    off = np.zeros((len(rows), len(intent.machine.axes)))
+    for axis in intent.machine.directed:
+        rests = intent.arrival[rows, axis] == 0
+        which = np.flatnonzero(np.where(holes, rests, intent.came[rows, axis] == 0))
+        states, way = intent.states(rows[which], place[which]), np.zeros((len(which), off.shape[1]), dtype=np.int8)
+        way[:, axis] = 1
+        one, other = (intent.machine.actual_tip(q[which], replace(states, direction=each)) for each in (way, -way))
+        off[which, axis] = lengths(other - one) * np.where(rests[which], 0.5, 1.0)
+    far = np.where(off > tolerance, off, 0.0)
+    which = np.flatnonzero(far.any(axis=1))
+    axes = tuple("".join(np.array(intent.moves.axes)[row > 0]) for row in far[which])
+    return Finding("NCF285", rows[which], far[which].max(axis=1, initial=0.0) * 1e3, SIDE, axes, SIDE_HINT)
 
 
 def _unknown_radius(intent: Intent, unchanged: Mask) -> Index:
