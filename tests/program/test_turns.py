@@ -90,6 +90,16 @@ def test_a_modal_feed_counts_up_to_a_change_of_inch_and_mm(dialect: str) -> None
     )
 
 
+@pytest.mark.parametrize(
+    "frame", ["SCALE X2 Y2 Z2\n", "SCALE X0.5 Y0.5 Z0.5\n", "MIRROR X0\n", "TRANS X5\n", "DIAMON\n"]
+)
+def test_no_frame_scales_a_feed(frame: str) -> None:
+    """The time of the turn stays, and so does the feed behind it."""
+    text, conflicts = corrected(f"G710\nG1 X11 F450\n{frame}A90\nX12\n", "siemens")
+    assert not conflicts
+    assert re.findall("G9[34]|F[0-9.]+", text) == ["F450", "G93", "F5.00000", "G94", "F450."]
+
+
 def test_a_turn_that_needs_no_linear_motion_stays_as_it_is() -> None:
     assert corrected("G1 A90 F450\n", "iso", shift=0.0004) == ("G1 A90 F450\nM2\n", {})
 

@@ -161,7 +161,8 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             raise SourceError.of(fault.code, fault.text, control.locate(), fault.hint) from None
         self.flow = KlartextFlow(control, self.main, self.find)
         control.locate = self.place
-        control.modal.unit, control.unit_said = self.main.mm, True
+        control.modal.unit = control.modal.per_feed = self.main.mm
+        control.unit_said = True
         control.recompose()
 
     def moves(self) -> Moves:
@@ -334,7 +335,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         for address, mode in (("F", 94), ("FU", 95), ("FZ", 95), ("FT", 94)):
             if address in words.values:
                 known = address not in words.unknown and address in ("F", "FU")
-                modal.feed = words.values[address] * self.control.modal.unit if known else math.nan
+                modal.feed = words.values[address] * modal.per_feed if known else math.nan
                 modal.feed_mode = mode
         if "fauto" in plan.flags:
             modal.feed = self.control.auto_feed

@@ -107,7 +107,7 @@ def stage_of(control: KlartextControl, unit: KlartextUnit, start: int, stop: int
     program, tables = unit.program, unit.lanes
     shapes, first = program.template[start:stop], program.first_number[start:stop]
     found = followed(
-        control, program.numbers, first, shapes, tables.words, (control.modal.unit, control.modal.feed, RAPID)
+        control, program.numbers, first, shapes, tables.words, (control.modal.per_feed, control.modal.feed, RAPID)
     )
     own = tables.side[shapes]
     side = filled(own.astype(np.float64), own >= 0, control.modal.compensated).astype(np.int64)

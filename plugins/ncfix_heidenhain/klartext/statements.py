@@ -217,7 +217,7 @@ def call_tool(
     if isinstance(tool, Unknown):
         tool = tool.why
     if "F" in words.values:
-        control.auto_feed = words.values["F"] * control.modal.unit
+        control.auto_feed = words.values["F"] * control.modal.per_feed
     if tool is None and "DR" in words.values:
         control.tools.cutter = math.nan
     if tool is None and "DL" not in words.values:

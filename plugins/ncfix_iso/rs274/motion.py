@@ -146,8 +146,7 @@ def feed_mode(control: RS274Control, block: Block, code: int) -> None:
 
 def feed(control: RS274Control, block: Block, code: int) -> None:
     """F."""
-    unit = 1.0 if control.modal.feed_mode == FeedMode.INVERSE_TIME else control.modal.unit
-    control.modal.feed = math.nan if "F" in block.unknown else unit * block.values["F"]
+    control.modal.feed = math.nan if "F" in block.unknown else control.feed_unit * block.values["F"]
     control.modal.feed_given = control.modal.feed != 0.0
 
 

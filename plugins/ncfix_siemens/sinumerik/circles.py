@@ -31,9 +31,11 @@ def tangential(control: Sinumerik, words: BlockWordValues) -> None:
     step = control.way_to(end.target)
     ahead = (0.0, 0.0) if heading is None else plane.of(heading)
     chord = plane.of(step)
-    if why or end.unknown or control.unknown or not math.hypot(*ahead):
+    lost = end.unknown or control.unknown
+    if why or lost or not math.hypot(*ahead):
+        why = why or ("" if lost else NO_HEADING)  # an axis that is not known refuses it by itself
         circle = circle_of(control, plane, (1.0, 0.0), 0.0)._replace(fixed=True)
-        control.go(MotionKind.ARC, words, end, CT_LEFT, refusal=why or NO_HEADING, arc=circle)
+        control.go(MotionKind.ARC, words, end, CT_LEFT, refusal=why, arc=circle)
         return
     along = ahead[0] * chord[0] + ahead[1] * chord[1]
     left = ahead[0] * chord[1] - ahead[1] * chord[0]

@@ -30,6 +30,8 @@ FINE_STAYS = "{} after G59: whether what G59 has set stays is not certain"
 AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
 CARRIED = "NCF255"
 MEASURED = "NCF259"
+INCH_MACHINE = "$mn_scaling_system_is_metric"
+"""Machine data 10240: 0, the machine counts in inches. So do its feeds under G70 and G71, whatever these say."""
 BASIC = "NCF282"
 ADDED = "G500 has an offset in the setup, which a control adds to {0} if it is a basic offset: {0} is taken as given"
 LIKE_IT = "give about what the probe finds: tenths of a millimetre matter little"
@@ -161,8 +163,10 @@ def plane(control: Sinumerik, code: int) -> None:
 
 
 def units(control: Sinumerik, code: int) -> None:
-    """G70, G71, G700, G710."""
-    control.set_unit(INCH if code in (700, 7000) else 1.0)
+    """G70, G71, G700, G710. With the first two feeds stay in the unit of the machine, see `INCH_MACHINE`."""
+    unit = INCH if code in (700, 7000) else 1.0
+    basic = INCH if control.variables.value(INCH_MACHINE) == 0.0 else 1.0
+    control.set_unit(unit, basic if code in (700, 710) else unit)
 
 
 def settable(control: Sinumerik, code: int) -> None:

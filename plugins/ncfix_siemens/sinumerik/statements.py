@@ -468,9 +468,8 @@ def feed(control: Sinumerik, turn: Turn) -> None:
     """Set the feed by F, unless it is the time of a dwell."""
     if "F" not in turn.words.values or 40 in turn.plan.g:
         return
-    value, modal = turn.words.values["F"], control.modal
-    unit = 1.0 if modal.feed_mode == 93 else modal.unit
-    modal.feed = float("nan") if value is None else unit * value
+    value = turn.words.values["F"]
+    control.modal.feed = float("nan") if value is None else control.feed_unit * value
 
 
 def strangers(control: Sinumerik, words: BlockWordValues) -> None:

@@ -116,7 +116,7 @@ class MotionBuilder:
         self.columns = [INDEX[axis] for axis in axes]
         self._styles: dict[MotionStyle, int] = {}
         self._reasons: dict[str, int] = {"": 0}
-        self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool, tuple[float, float]], int] = {}
+        self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool, tuple[float, float], float], int] = {}
         self._calls: dict[CycleCall, int] = {}
         self.rolls: Mask | None = None
         self.winding: Winding | None = None
@@ -165,9 +165,10 @@ class MotionBuilder:
         unit: float,
         diameter: bool,
         increments: tuple[float, float] = (1.0, 1.0),
+        per_feed: float = 1.0,
     ) -> int:
-        """The index of a frame; a new frame is added. `offset` has one number per axis letter."""
-        key = (tuple(offset[column] for column in self.columns), rotation, unit, diameter, increments)
+        """The index of a frame, see `Frame`; a new frame is added. `offset` has one number per axis letter."""
+        key = (tuple(offset[column] for column in self.columns), rotation, unit, diameter, increments, per_feed)
         return self._frames.setdefault(key, len(self._frames))
 
     # -- motions ------------------------------------------------------------------------------------------------------
@@ -289,8 +290,8 @@ class MotionBuilder:
             normal=normal,
             sweep=sweep,
             frames=tuple(
-                Frame(np.array(offset, dtype=np.float64), np.array(rotation), unit, diameter, increments)
-                for offset, rotation, unit, diameter, increments in self._frames
+                Frame(np.array(offset, dtype=np.float64), np.array(rotation), unit, diameter, increments, per_feed)
+                for offset, rotation, unit, diameter, increments, per_feed in self._frames
             ),
             reasons=tuple(self._reasons),
             approach=_sparse(self._approaches, neutral_column("approach", n, width)),

@@ -98,8 +98,8 @@ class Frame:
     unit      mm per program unit of linear words: 1.0 or 25.4
     diameter  X is programmed as a diameter (G7)
     increments  weight of a number without a decimal point, for linear and rotary words: 0.001 where the control reads
-                such
-              numbers in least increments, else 1
+              such numbers in least increments, else 1
+    per_feed  mm per unit of a feed: without a scale of the program, and not always that of lengths
     """
 
     offset: Array
@@ -107,6 +107,7 @@ class Frame:
     unit: float
     diameter: bool = False
     increments: tuple[float, float] = (1.0, 1.0)
+    per_feed: float = 1.0
 
 
 @frozen

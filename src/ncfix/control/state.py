@@ -70,6 +70,7 @@ class Modal:
     straight      the last of G0 and G1
     plane         plane of arcs and cycles
     unit          mm per unit of linear words
+    per_feed      mm per unit of feeds per minute or revolution
     diameter      X words are diameters (G7)
     incremental   G91
     arc_absolute  G90.1
@@ -89,6 +90,7 @@ class Modal:
     straight: int = NO_MOTION
     plane: Plane = PLANES[170]
     unit: float = 1.0
+    per_feed: float = 1.0
     diameter: bool = False
     incremental: bool = False
     arc_absolute: bool = False
@@ -242,17 +244,22 @@ class ControlState(ABC):
         self.warn(BLOCK_DELETE, f"blocks with {name} are taken as {told}", hint)
         return deleted
 
-    def set_unit(self, unit: float) -> None:
-        """Set the unit of linear words: `unit` in mm.
+    def set_unit(self, unit: float, per_feed: float | None = None) -> None:
+        """Set the unit of linear words, `unit` in mm, and that of feeds, if another, `per_feed` in mm.
 
-        A feed set before is then unknown: a rotary axis keeps its degrees, and controls differ in what else they
-        convert.
+        A feed set before in another unit is then unknown: a rotary axis keeps its degrees, and controls differ in what
+        else they convert.
         """
-        modal = self.modal
-        if unit != modal.unit and modal.feed_mode != FeedMode.INVERSE_TIME:
+        modal, per_feed = self.modal, unit if per_feed is None else per_feed
+        if per_feed != modal.per_feed and modal.feed_mode != FeedMode.INVERSE_TIME:
             modal.feed = math.nan
-        self.unit_said, modal.unit = True, unit
+        self.unit_said, modal.unit, modal.per_feed = True, unit, per_feed
         self.refresh()
+
+    @property
+    def feed_unit(self) -> float:
+        """What the number of an F word counts in the feed mode in force."""
+        return 1.0 if self.modal.feed_mode == FeedMode.INVERSE_TIME else self.modal.per_feed
 
     @property
     def feed_in_force(self) -> Value:
@@ -260,7 +267,7 @@ class ControlState(ABC):
         modal = self.modal
         if math.isnan(modal.feed):
             return Unknown("F") if modal.feed_given else 0.0
-        return modal.feed / (1.0 if modal.feed_mode == FeedMode.INVERSE_TIME else modal.unit)
+        return modal.feed / self.feed_unit
 
     # -- frames -------------------------------------------------------------------------------------------------------
 

@@ -287,6 +287,12 @@ def test_machine_coordinates_mean_the_tip_of_the_tool_or_of_one_without_length(
     assert (alike == ~np.isnan(end(tool_off=2.0))).all()
 
 
+def test_an_arc_that_goes_on_from_an_unknown_place_is_refused_for_that() -> None:
+    words = reasons(follow("G74 Z0\nG0 X0 Y0\nG1 X9 F99\nCT X12 Y5\nG1 Z0\nCT X20"))
+    assert ["the axis Z stands after a reference" in why for why in words] == [False, True, True, True, True, False]
+    assert "which direction" in words[-1]
+
+
 def test_what_a_line_by_its_angle_leaves_out_is_not_known() -> None:
     followed = follow("G54 G0 X0 Y0 Z0\nG1 ANG=30 X40 F100\nX50\nX60 Y5\nX70")
     assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.REFUSE, Rule.REFUSE, Rule.REFUSE, Rule.CORRECT]
@@ -339,6 +345,16 @@ def test_a_modal_cycle_drills_behind_machine_positions_too() -> None:
 def test_an_axis_that_the_machine_lacks_is_named() -> None:
     with pytest.raises(UsageError, match="axis C1"):
         follow("G0 X1 C1=DC(5)")
+
+
+@pytest.mark.parametrize(("metric", "basic"), [(None, 1.0), (1.0, 1.0), (0.0, 25.4)])
+def test_lengths_by_g70_leave_feeds_in_the_unit_of_the_machine(metric: float | None, basic: float) -> None:
+    given = {} if metric is None else {"$MN_SCALING_SYSTEM_IS_METRIC": metric}
+    text = "G71 G1 X1 F100\nG70 X1\nG71 X2\nG700 F20 X1\nG70 X2\nF30 X3\nG710 F400 X1"
+    feeds = follow(text, variables=given).moves.feed.tolist()
+    kept = 20 * 25.4 if basic != 1.0 else math.nan
+    expected = [100 * basic, 100 * basic, 100 * basic, 20 * 25.4, kept, 30 * basic, 400]
+    assert feeds == pytest.approx(expected, nan_ok=True)
 
 
 def test_dwells_take_f_as_their_time() -> None:

@@ -16,7 +16,6 @@ from ncfix import core
 from ncfix.arrays import Array, Ints, Mask
 from ncfix.control.control import ProgramControl
 from ncfix.control.coordinates import N_LETTERS
-from ncfix.control.moves import FeedMode
 from ncfix.text.tree import Program
 from ncfix.values import frozen, mutable
 
@@ -146,14 +145,9 @@ def stage_of(control: ProgramControl, unit: ProgramText, start: int, stop: int) 
     """Evaluate the blocks from `start` to before `stop`, beginning at the present state of the control."""
     program = unit.program
     shapes, first = program.template[start:stop], program.first_number[start:stop]
-    before = feed_unit(control), control.modal.feed, float(control.modal.motion)
+    before = control.feed_unit, control.modal.feed, float(control.modal.motion)
     stage = followed(control, program.numbers, first, shapes, unit.lanes, before)
     return replace(stage, turns=unit.lanes.turns.take(shapes)) if unit.lanes.turns.any() else stage
-
-
-def feed_unit(control: ProgramControl) -> float:
-    """mm per unit of an F word; 1 under inverse time feed."""
-    return 1.0 if control.modal.feed_mode == FeedMode.INVERSE_TIME else control.modal.unit
 
 
 def words(numbers: Array, first: Ints, slots: Ints) -> Array:
@@ -242,7 +236,7 @@ class Lookahead:
 
     def stretch(self, control: ProgramControl, unit: ProgramText, block: int, stop: int) -> BlockRows:
         """The blocks from `block` to before `stop`, from the present state. The caller then sets `done`."""
-        frame = control.modal.incremental, feed_unit(control), *control.offset, *control.scale
+        frame = control.modal.incremental, control.feed_unit, *control.offset, *control.scale
         begin, stage = self.begin, self.stage
         known = stage is not None and frame == self.frame and not control.modal.incremental
         if stage is None or not known or not max(begin, self.done) < block < stop <= begin + len(stage.mask):
