@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from numbers import Integral, Real
 from typing import Any
@@ -51,6 +52,9 @@ def check_choice(name: str, value: object, known: Sequence[str]) -> None:
 
 OFFSET_AXES = tuple("XYZABCUVW")
 """Axes that a setup may name."""
+WORK_OFFSET = re.compile(r"G5[4-9]|G59\.[1-3]|G54\.1P[1-9]\d*|G500|G5(?:0[5-9]|[1-9]\d)|PRESET\d*")
+"""Names of work offsets: G54 to G59.3, G54.1P1 and so on; of SINUMERIK G500, G505 to G599; of the TNC PRESET (the one
+active when the program starts), PRESET1 and so on."""
 FINITE = NumberRange(-math.inf, inside=True)
 """Any finite number."""
 TOLERANCE_UM = NumberRange(0.01)

@@ -106,6 +106,16 @@ def test_names_with_dots_are_found() -> None:
     assert [message.place.line for message in caught.value.messages if message.place] == [2, 4]
 
 
+@pytest.mark.parametrize("key", ['"G54.1P5"', '"G54.1 P5"', "G54.1P5"])
+def test_a_work_offset_is_named_as_in_a_program(key: str) -> None:
+    assert loads(f"[work_offsets]\n{key} = [1]\n").work_offsets == {"G54.1P5": {"X": 1.0}}
+
+
+def test_the_same_work_offset_with_and_without_a_blank_is_there_twice() -> None:
+    with pytest.raises(ConfigError, match=r"G54\.1P5 is there twice"):
+        loads('[work_offsets]\n"G54.1 P5" = [1]\n"G54.1P5" = [1]\n')
+
+
 def test_files_are_utf_8_with_or_without_its_mark(tmp_path: Path) -> None:
     path = tmp_path / "setup.toml"
     path.write_text(FULL, encoding="utf-8")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ncfix.arguments import OFFSET_AXES
+from ncfix.arguments import OFFSET_AXES, WORK_OFFSET
 from ncfix.cli.console import tell
 from ncfix.cli.options import PATH
 from ncfix.diagnostics import Message, Place
@@ -27,17 +27,23 @@ BOTH = "both"
 
 
 class KeyValue(click.ParamType):  # type: ignore[type-arg]
-    """`KEY=VALUE`; `convert_value` converts the value, or raises ValueError with the reason."""
+    """`KEY=VALUE`; `convert_value` converts the value, or raises ValueError with the reason.
 
-    def __init__(self, metavar: str, convert_value: Callable[[str, str], Any], upper: bool = True) -> None:
+    upper   case means nothing in a key; `blanks`: blanks do
+    """
+
+    def __init__(
+        self, metavar: str, convert_value: Callable[[str, str], Any], upper: bool = True, blanks: bool = True
+    ) -> None:
         self.name = metavar
         self.convert_value = convert_value
-        self.upper = upper
+        self.upper, self.blanks = upper, blanks
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The key, in upper case unless case matters, and the value."""
         key, equals, text = str(value).partition("=")
-        key = key.strip().upper() if self.upper else key.strip()
+        key = key.strip() if self.blanks else "".join(key.split())
+        key = key.upper() if self.upper else key
         if not equals:
             self.fail(f"{value!r} has no =; it reads like {self.name}", param, ctx)
         try:
@@ -60,7 +66,7 @@ def number(text: str) -> float:
 def offset_values(name: str, text: str) -> dict[str, float]:
     """A work offset by axis letter, from `0,0,-300` or `X0,Z-300`."""
     parts = [part.strip() for part in text.split(",")]
-    if not re.fullmatch(r"G5[4-9](\.[1-9]\d*(P[1-9]\d*)?)?|G500|G5(0[5-9]|[1-9]\d)|PRESET\d*", name):
+    if not WORK_OFFSET.fullmatch(name):
         raise ValueError(f"{name} is not a work offset")
     if all(AXIS.match(part.upper()) for part in parts):
         letters = [part[0].upper() for part in parts]
@@ -134,7 +140,7 @@ OPTIONS = (
     click.option(
         "--offset",
         "offsets",
-        type=KeyValue("G54=0,0,-300", offset_values),
+        type=KeyValue("G54=0,0,-300", offset_values, blanks=False),
         multiple=True,
         help="A work offset in the order X Y Z A B C, mm and degrees (repeatable).",
     ),

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from ncfix.arguments import WORK_OFFSET
 from ncfix.control.coordinates import LETTERS
 from ncfix.control.setup import CALCULATOR, POINTLESS, Setup, Tool
 from ncfix.diagnostics import ConfigError, Place
@@ -18,10 +19,6 @@ NOT_TOML = "NCF381"
 UNKNOWN_KEY = "NCF382"
 WRONG_VALUE = "NCF383"
 CODES = KeyCodes(UNKNOWN_KEY, *4 * (WRONG_VALUE,))
-
-SYSTEM = re.compile(r"G5[4-9]|G59\.[1-3]|G54\.1P\d+|G500|G5(?:0[5-9]|[1-9]\d)|PRESET\d*")
-"""Names of work offsets: G54 to G59.3, G54.1P1 and so on; of SINUMERIK G500, G505 to G599; of the TNC PRESET (the one
-active when the program starts), PRESET1 and so on."""
 
 VARIABLE = re.compile(r"#\d+|#<[^<>]*>|[A-Z_$][A-Z\d_$]*(?:\[[-\d, ]+\])?")
 """Names of variables: with # for RS274 and Fanuc, in upper case for other controls (R1, Q5, _DEPTH, LIST[2])."""
@@ -60,14 +57,20 @@ def loads(text: str, path: str = "<setup>") -> Setup:
 def _each(
     pattern: re.Pattern[str], wrong: str, hint: str, reader: Callable[[TomlTable, str], Any]
 ) -> Callable[[TomlTable, str], dict[str, Any]]:
-    """A reader of a table whose values are all read by `reader`; `wrong`: message for a name that is not allowed."""
+    """A reader of a table whose values are all of one kind; `wrong` is said of a name that cannot be.
+
+    Blanks in a name count as none where it has none: `G54.1 P5` as in a program.
+    """
 
     def read(root: TomlTable, key: str) -> dict[str, Any]:
         found = {}
         for name, table, own in _entries(root.table(key)):
-            if not pattern.fullmatch(name):
+            plain = name if pattern.fullmatch(name) else "".join(name.split())
+            if not pattern.fullmatch(plain):
                 table.note(UNKNOWN_KEY, own, wrong, hint)
-            found[name] = reader(table, own)
+            elif plain in found:
+                table.note(UNKNOWN_KEY, own, f"{plain} is there twice")
+            found[plain] = reader(table, own)
         return found
 
     return read
@@ -82,7 +85,7 @@ def _entries(table: TomlTable | None) -> Iterator[tuple[str, TomlTable, str]]:
         return
     for name, value in table.values.items():
         inner = TomlTable(value if isinstance(value, dict) else {}, (*table.path, name), table.report)
-        rest = {part: each for part, each in inner.values.items() if not part.isdigit()}
+        rest = {part: each for part, each in inner.values.items() if not part[:1].isdigit()}
         yield from ((f"{name}.{part}", inner, part) for part in inner.values if part not in rest)
         if rest or not inner.values:
             yield name, TomlTable({name: rest or value}, table.path, table.report), name
@@ -175,7 +178,7 @@ def _tool(table: TomlTable, key: str) -> Tool:
 
 
 READERS: dict[str, Callable[[TomlTable, str], Any]] = {
-    "work_offsets": _each(SYSTEM, "no work offset", "they are G54 ... G59.3, and G54.1P1 ...", _offset),
+    "work_offsets": _each(WORK_OFFSET, "no work offset", "they are G54 ... G59.3, and G54.1P1 ...", _offset),
     "tools": _tools,
     "initial": _position,
     "references": _each(re.compile("G28|G30|M92"), "no reference point", "they are G28, G30 and M92", _position),

@@ -54,7 +54,7 @@ def turn_alone(moves: Moves, row: int) -> float:
 
 
 def written_feed(moves: Moves, row: int) -> float:
-    """The number of the F in force in a motion; NaN if it is not known."""
+    """The number of the F word in force in a motion; NaN if unknown."""
     unit = 1.0 if moves.feed_mode[row] == FeedMode.INVERSE_TIME else moves.frames[moves.frame[row]].per_feed
     return float(moves.feed[row] / unit)
 
