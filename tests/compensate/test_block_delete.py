@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.compensate import FixOptions
+from ncfix.compensate import FixOptions, block_delete
 from ncfix.compensate.checking import check_on
 from ncfix.compensate.driver import Fixed, fix_flat, fix_program
 from ncfix.compensate.following import traced
@@ -212,6 +212,22 @@ def test_blocks_that_change_no_path_ask_no_switch(machine: Machine) -> None:
     stamp, *lines = fixed(text, machine).text.splitlines()
     assert b"block delete" not in stamp
     assert [line for line in lines if line[:1] != b"/"] == fixed(plain, machine).text.splitlines()[1:]
+
+
+@pytest.mark.parametrize("steps", [10, 40])
+def test_a_chain_of_blocks_that_differ_takes_no_attempt_for_each(
+    steps: int, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each increment begins where the one before ends, and is found to differ when that one is refused."""
+    made = list[object]()
+    plan = block_delete.plan_and_write
+    monkeypatch.setattr(
+        block_delete, "plan_and_write", lambda *given, **more: (made.append(0), plan(*given, **more))[1]
+    )
+    chain = "".join(f"{'/' if k % 3 == 0 else ''}{'XYZ'[k % 2]}{k % 5 + 1}\n" for k in range(steps))
+    found = fixed(f"G21 G90 G17\nG0 X0 Y0 Z0\nG1 X1 F99\nG91\n{chain}G90\nG0 Z9\nM2\n", machine)
+    assert found.report.refused
+    assert len(made) <= 24
 
 
 def test_check_looks_at_both_positions(machine: Machine) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import multiprocessing
 import os
+import pickle
 import signal
 from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
@@ -116,6 +117,28 @@ def test_what_does_not_arrive(here: bool, machine: Machine, monkeypatch: pytest.
     monkeypatch.setattr(Connection, "send_bytes", full)
     with pytest.raises(WorkerGoneError):
         streamed(program(5, 400, 0.0), machine, 1000, jobs=2)
+
+
+@pytest.mark.parametrize("here", [False, True])
+def test_a_fault_of_ncfix_that_keeps_messages_from_being_sent_is_shown_as_such(
+    here: bool, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, dumps = os.getpid(), pickle.dumps
+
+    class NowhereMailbox(Mailbox):
+        """Sends its messages to a process that there is not."""
+
+        def send(self, kind: str, number: int, what: Any, to: int | None = None) -> None:
+            if (os.getpid() == own) == here:
+                self.unsent.put((99, dumps((kind, number, what))))
+            else:
+                super().send(kind, number, what, to)
+
+    monkeypatch.setattr(workers, "Mailbox", NowhereMailbox)
+    with pytest.raises(KeyError, match="99") as caught:
+        streamed(program(5, 400, 0.0), machine, 1000, jobs=2)
+    assert here or "in _send" in caught.value.__notes__[0]
+    assert not multiprocessing.active_children()
 
 
 def test_messages_of_any_size_that_nobody_hears_yet() -> None:

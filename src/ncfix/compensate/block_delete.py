@@ -49,6 +49,9 @@ MOST_SWITCHES = 4
 ATTEMPTS = 16
 """Largest number of attempts. The second knows the frames that the first has moved, each further one those that depend
 on them."""
+ONE_BY_ONE = 4
+"""Attempts after which the blocks behind the first one that differs are treated as that one is: each further attempt
+would find only the next of a chain of blocks that begin where another ends, and a program may be one chain."""
 POSITION_DECIMALS = 9
 """Decimals, of mm and rad, to which two positions must agree to count as the same."""
 WHY = "where a block with / before it is skipped, this block needs another correction than where that is executed"
@@ -250,6 +253,7 @@ def plan_and_write_all(
         return JointPlan((solution,), solution.emission.splices, solution.emission.added_blocks)
     refused, whole = dict(refused), _starting_elsewhere(moves)
     spelled, resting, passed, tried = dict[int, Mask](), set[int](), set[int](), set[int]()
+    attempts = 0
     while True:
         plans: list[WrittenPlan] = []
         for k, own in enumerate(moves):
@@ -269,6 +273,10 @@ def plan_and_write_all(
             return _merged(plans, edits)
         if differing <= refused.keys():
             raise AssertionError(f"blocks {sorted(differing)} are unchanged and yet differ")
+        attempts += 1
+        if attempts > ONE_BY_ONE:
+            nearest = min(differing - refused.keys())
+            differing |= {block for block in whole if block > nearest} - refused.keys() - passed
         for block in differing - spelled.keys():
             spelled[block] = _displaced_axes(plans, block)
             whole.add(block)

@@ -27,10 +27,12 @@ from dataclasses import field
 from itertools import combinations
 from queue import SimpleQueue
 from threading import Thread
+from traceback import format_exception
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from ncfix.compensate.solve import PrecedingMotion
 from ncfix.control.trace import Checkpoint
+from ncfix.diagnostics import NcfixError
 from ncfix.host import tie
 from ncfix.plugins import blamed
 from ncfix.values import frozen, mutable
@@ -40,6 +42,10 @@ if TYPE_CHECKING:
 
     Connections = Mapping[tuple[int, int], Connection]
     """(one, other) -> the end that process `one` has of its connection to process `other`."""
+
+
+BUG = "bug"
+"""The kind of message that says what fault of ncfix has ended a process."""
 
 
 class WorkerGoneError(Exception):
@@ -54,12 +60,14 @@ class Mailbox:
     connections  number of another process -> connection to it
     received     (kind, number) -> message; the number is mostly that of a part
     unsent       messages to be sent; a thread sends them, so that `send` never waits for the receiver
+    bug          fault of ncfix that has ended this thread
     """
 
     process: int = 0
     connections: Mapping[int, Connection] = field(default_factory=dict)
     received: dict[tuple[str, int], Any] = field(default_factory=dict)
     unsent: SimpleQueue[tuple[int, bytes] | None] = field(default_factory=SimpleQueue)
+    bug: Exception | None = None
 
     def send(self, kind: str, number: int, what: Any, to: int | None = None) -> None:
         """Send a message to one process, or to all others. Raises here, not in the thread, if it cannot be pickled."""
@@ -73,7 +81,8 @@ class Mailbox:
     def receive(self, seconds: float | None = None) -> bool:
         """Take in messages that have arrived; without any, wait for one, at most `seconds` (None: without a limit).
 
-        Returns whether there was any. Raises `WorkerGoneError`.
+        Returns whether there was any. Raises `WorkerGoneError`, and a fault that has ended the thread that sends, here
+        or in another process.
         """
         if not self.connections:
             assert seconds is not None, "no other process could send it"
@@ -85,7 +94,9 @@ class Mailbox:
             try:
                 kind, number, what = pickle.loads(connection.recv_bytes())
             except (EOFError, OSError):
-                raise WorkerGoneError("a process that worked on the program has ended") from None
+                raise self.bug or WorkerGoneError("a process that worked on the program has ended") from None
+            if kind == BUG:
+                raise what
             self.received[kind, number] = what
         return bool(ready)
 
@@ -113,7 +124,13 @@ class Mailbox:
             while message := self.unsent.get():
                 to, data = message
                 self.connections[to].send_bytes(data)
-        except Exception:
+        except (OSError, MemoryError):
+            failed()
+        except Exception as bug:
+            self.bug = bug
+            with suppress(Exception):
+                if self.process:
+                    self.connections[0].send_bytes(pickle.dumps((BUG, self.process, _portable(bug))))
             failed()
 
 
@@ -412,5 +429,8 @@ def _portable(error: Exception) -> Exception:
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:
-        return RuntimeError(f"{type(error).__name__}: {error}")
+        instead = RuntimeError(f"{type(error).__name__}: {error}")
+        for note in getattr(error, "__notes__", ()):
+            instead.add_note(note)
+        return instead
     return error

@@ -57,9 +57,9 @@ def loads(text: str, path: str = "<setup>") -> Setup:
 def _each(
     pattern: re.Pattern[str], wrong: str, hint: str, reader: Callable[[TomlTable, str], Any]
 ) -> Callable[[TomlTable, str], dict[str, Any]]:
-    """A reader of a table whose values are all of one kind; `wrong` is said of a name that cannot be.
+    """A reader of a table whose values are all read by `reader`; `wrong`: message for a name that is not allowed.
 
-    Blanks in a name count as none where it has none: `G54.1 P5` as in a program.
+    Names may have blanks as in a program: `G54.1 P5` is G54.1P5.
     """
 
     def read(root: TomlTable, key: str) -> dict[str, Any]:

@@ -413,6 +413,8 @@ def _sides_unknown(intent: Intent, rows: Index, tolerance: float) -> Finding:
     for axis in intent.machine.directed:
         rests = intent.arrival[rows, axis] == 0
         which = np.flatnonzero(np.where(holes, rests, intent.came[rows, axis] == 0))
+        if not which.size:
+            continue
         states, way = intent.states(rows[which], place[which]), np.zeros((len(which), off.shape[1]), dtype=np.int8)
         way[:, axis] = 1
         one, other = (intent.machine.actual_tip(q[which], replace(states, direction=each)) for each in (way, -way))
