@@ -158,7 +158,7 @@ def test_much_is_said_and_no_more(shop: Any, ncfix: Any) -> None:
         ("fix", shop.program, "-m", shop.machine, "-o", out, "--assume-zero"),
     ):
         result = ncfix(*command)
-        assert (result.code, "50 um is much" in result.err) == (ExitCode.DONE, True)
+        assert (result.code, "50 um is more than 30 um" in result.err) == (ExitCode.DONE, True)
 
 
 @pytest.mark.parametrize("topology", TOPOLOGIES)

@@ -71,21 +71,26 @@ def test_axes_that_machine_coordinates_do_not_name_stand_still_under_tcp(
     np.testing.assert_allclose(end[named], wanted, atol=1e-9)
 
 
+@pytest.mark.parametrize(("tool_off", "tool"), [(0.0, 100.0), (1.0, 0.0)])
 @pytest.mark.parametrize("block", ["SUPA G0 Z240", "G53 G0 X20", "G153 G1 Y-15 Z200 F500"])
-def test_axes_that_machine_coordinates_do_not_name_stand_still_in_a_swivelled_plane(root: Path, block: str) -> None:
+def test_axes_that_machine_coordinates_do_not_name_stand_still_in_a_swivelled_plane(
+    root: Path, block: str, tool_off: float, tool: float
+) -> None:
     swivel = 'CYCLE800(1,"T",0,57,0,0,0,10,15,5,0,0,0,-1)'
     text = f"G90 G710\nT1 D1\nG0 X0 Y0 Z200 A0 C0\n{swivel}\nG0 X10 Y20 Z30\n{block}\nM30\n"
     machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
-    moves = follow(read(text.encode(), "a.mpf", "siemens"), machine, SETUP).trace.moves
+    program = read(text.encode(), "a.mpf", "siemens")
+    moves = follow(program, machine, replace(SETUP, variables={"$MN_G53_TOOLCORR": tool_off})).trace.moves
     kinematics, on, off = kinematics_of(machine), TcpState(True, 100.0), TcpState(False, 0.0)
     assert kinematics is not None
     assert moves.rule[-1] == Rule.PASS
+    unsure = np.isnan(follow(program, machine, SETUP).trace.moves.end[-1]).any()
+    assert unsure == ("Z" in block)
     start, end = np.array(kinematics(moves.end[-2].tolist(), on, off)), moves.end[-1]
     assert not moves.tcp[-1]  # said in axes of the machine
     words = {word[0]: float(word[1:]) for word in block.split()[2:] if word[0] in "XYZ"}
-    tool = {"Z": 100.0}
     wanted = [
-        words.get(axis, place) + tool.get(axis, 0.0) * (axis in words)
+        words.get(axis, place) + tool * (axis == "Z" and axis in words)
         for axis, place in zip(moves.axes, start, strict=True)
     ]
     # affine maps of 256 mm probes in double precision

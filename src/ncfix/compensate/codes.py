@@ -96,7 +96,8 @@ CODES = {
         "more is left than the tolerance",
         "The program was corrected, and the simulation of the result shows a place where the tool tip is farther off "
         "than `--tolerance-um` and the control's digits allow. Where motions are passed by rule or refused, those "
-        "beside them begin or end on them; depths and retract planes of some cycles stay as they are.",
+        "beside them begin or end on them; depths and retract planes of some cycles stay as they are. Motions at "
+        "corners that the control rounds or breaks (RND, CHF) are not split, and get no axis that they do not move.",
         "`ncfix verify` looks along the whole path and says where; a larger tolerance makes the warning go away, not "
         "the error.",
     ),

@@ -108,7 +108,10 @@ class Mailbox:
 
     @contextmanager
     def sending(self, failed: Callable[[], object]) -> Iterator[Mailbox]:
-        """Run the thread that sends; it calls `failed` if it cannot send, for example for lack of memory."""
+        """Run the thread that sends; it calls `failed` if it cannot send, for example for lack of memory.
+
+        A fault of ncfix becomes the `bug`, or goes to the first process before that.
+        """
         sender = Thread(target=self._send, args=(failed,), daemon=True)
         sender.start()
         try:
@@ -425,7 +428,9 @@ def _work(worker: Callable[[Read], Worker[Any]], files: OpenFiles, jobs: int, pr
 
 
 def _portable(error: Exception) -> Exception:
-    """The error; a RuntimeError with its text if it cannot be pickled."""
+    """The error, of a fault of ncfix with its traceback; a RuntimeError with its text if it cannot be pickled."""
+    if not isinstance(error, NcfixError):
+        error.add_note(f"In another process:\n{''.join(format_exception(error))}")
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:

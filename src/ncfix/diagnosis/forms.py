@@ -214,7 +214,7 @@ def _visible_shares(data: ResidualData, basis: Array, groups: Sequence[EffectFor
     columns = np.concatenate([group.columns.T for group in groups]) / data.relative
     squares, hidden = np.einsum("ij,ij->i", columns, columns), ((columns @ basis) ** 2).sum(axis=1)
     parts = [slice(start, stop) for start, stop in pairwise(column_bounds(groups))]
-    return [max(round(float(1.0 - hidden[part].sum() / squares[part].sum()), SHARE_DIGITS), 0.0) for part in parts]
+    return [max(0.0, round(float(1.0 - hidden[part].sum() / squares[part].sum()), SHARE_DIGITS)) for part in parts]
 
 
 def _smooth_fields(data: ResidualData) -> Iterator[EffectForm | None]:

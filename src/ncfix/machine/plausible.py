@@ -189,14 +189,15 @@ def _sizes(machine: Machine) -> Iterator[Fault]:
         )
         if size <= limit:
             continue
-        hint, impossible, extent = "", size > BEYOND * limit, "much, and more than"
+        hint, impossible, extent = "", size > BEYOND * limit, "more than"
         if impossible:
             meant = [f"{size:.4g} {unit}" for unit, factor in UNITS[angle] if LEAST * limit <= size * factor <= limit]
             hint = f"is {' or '.join(meant)} meant? Coefficients are in {'rad' if angle else 'mm'}"
             hint = hint if meant else "see the unit, and `center`, `scale` and `range`"
-            extent = f"{size / limit:.3g} times what is much,"
-        text = f"{name}, {component_title(name, machine.axis(name[-1]))}: {sized(size, angle)} is {extent}"
-        yield "NCF320", f"{text} {sized(limit, angle)}", hint, impossible, "effect", name, "coefficients"
+            extent = f"{size / limit:.3g} times"
+        title, most = component_title(name, machine.axis(name[-1])), sized(limit, angle)
+        text = f"{name}, {title}: {sized(size, angle)} is {extent} {most}, which few machines exceed"
+        yield "NCF320", text, hint, impossible, "effect", name, "coefficients"
 
 
 def _largest(machine: Machine, effects: Sequence[Effect]) -> float:

@@ -174,20 +174,29 @@ def poses_along(axis: int, positions: Array, rest: Array) -> Array:
 
 @frozen
 class Residual:
-    """Tip errors at poses q (n, n_axes), before and after (n,), mm; `largest` correction per axis (n_axes,)."""
+    """Tip errors at poses q (n, n_axes), before and after (n,), mm, with the corrections there, (n, n_axes)."""
 
     names: tuple[str, ...]
     rotary: Mask
     q: Array
     before: Array
     after: Array
-    largest: Array
+    correction: Array
+
+    @property
+    def largest(self) -> Array:
+        """The largest correction of each axis, (n_axes,) mm and rad."""
+        sizes: Array = np.abs(self.correction).max(axis=0)
+        return sizes
+
+    def pose(self, row: int) -> dict[str, float]:
+        """A pose by axis letter, mm and degree."""
+        pose = np.where(self.rotary, np.degrees(self.q[row]), self.q[row])
+        return {name: round(float(value), 3) for name, value in zip(self.names, pose, strict=True)}
 
     def figures(self) -> dict[str, dict[str, Any]]:
         """Figures for `--json`, um; `at` is the pose with the largest error with tables, mm and degree."""
-        worst = int(np.argmax(self.after))
-        pose = np.where(self.rotary, np.degrees(self.q[worst]), self.q[worst])
-        at = {name: round(float(value), 3) for name, value in zip(self.names, pose, strict=True)}
+        at = self.pose(int(np.argmax(self.after)))
         return {"before": _size(self.before), "after": {**_size(self.after), "at": at}}
 
 
@@ -212,5 +221,5 @@ def residual(machine: Machine, tables: Tables, space: Array, tool_length: float,
         q,
         np.linalg.norm(machine.actual_tip(q, state) - meant, axis=-1),
         np.linalg.norm(machine.actual_tip(q + correction, state) - meant, axis=-1),
-        np.abs(correction).max(axis=0),
+        correction,
     )

@@ -306,11 +306,13 @@ def _wrong_turn(request: Request, tables: Tables) -> Iterator[tuple[str, str]]:
 
 def _check_size(machine: Machine, left: Residual, target: float) -> None:
     allowed: Array = np.where(machine.rotary, machine.max_correction[1], machine.max_correction[0])
-    for name, value, limit, rotary in zip(left.names, left.largest, allowed, machine.rotary, strict=True):
+    rows = np.argmax(np.abs(left.correction), axis=0).tolist()
+    for name, row, value, limit, rotary in zip(left.names, rows, left.largest, allowed, machine.rotary, strict=True):
         if value > limit:
+            at = " ".join(f"{axis}{place:g}" for axis, place in left.pose(row).items())
             angles = f"{np.degrees(value):.4f} of {np.degrees(limit):.4f} degree"
             shown = angles if rotary else f"{value:.3f} of {limit} mm"
-            text = f"the correction of {name} is larger than this machine allows: {shown}"
+            text = f"the correction of {name} is larger than this machine allows: {shown} at {at}"
             raise RefusedError.of("NCF489", text, hint="max_correction in the machine file, if that is right")
     if np.mean(left.after**2) > np.mean(left.before**2) + (target / 10) ** 2:
         sizes = [f"{1e3 * float(np.sqrt(np.mean(each**2))):.3g}" for each in (left.after, left.before)]
