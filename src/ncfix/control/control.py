@@ -250,12 +250,7 @@ class ProgramControl(ControlState):
         """The index of the frame in force."""
         if self._frame < 0:
             self._frame = self.builder.frame(
-                self.offset,
-                self.rotation,
-                self.stretch,
-                self.modal.diameter,
-                self.increments,
-                self.modal.per_feed,
+                self.offset, self.rotation, self.stretch, self.modal.diameter, self.increments, self.modal.per_feed
             )
         return self._frame
 
