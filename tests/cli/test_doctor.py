@@ -38,26 +38,14 @@ def test_a_form_of_the_core_that_there_is_not(ncfix: Any, monkeypatch: pytest.Mo
     assert "NCF001: NCFIX_CORE is 'fast'; it may be 'plain' or 'compiled'\n  hint: unset NCFIX_CORE" in result.err
 
 
-def test_what_is_wrong(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    there = {"numpy": "1.2", "lark": None}
-    version = doctor._version
-    monkeypatch.setattr(doctor, "_version", lambda name: there.get(name, version(name)))
-    result = ncfix("doctor")
-    assert result.code == ExitCode.FINDINGS
-    assert "WRONG: pip install 'lark>=" in result.out.decode()
-    assert "1.2\n" in result.out.decode()
-    assert result.out.decode().count("WRONG") == 2
-
-
-def test_what_only_extras_ask_for_is_not_needed(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_packages_that_are_missing_or_too_old_are_wrong_and_those_of_extras_are_not() -> None:
     lines = ["lark>=1.2", "numpy!=2.0,>=1.26", "pluggy", "cython<4,>=3.2; extra == 'dev'", 'ruff>=0.9 ; extra == "dev"']
-    monkeypatch.setattr(doctor, "_requirements", lambda: lines)
-    monkeypatch.setattr(doctor, "_version", lambda name: "1.3" if name == "lark" else None)
-    said = ncfix("doctor").out.decode()
-    assert said.count("WRONG") == 2
-    assert "pip install 'numpy>=1.26'" in said
-    assert "pip install 'pluggy'" in said
-    assert "cython" not in said
+    found = {each.what: each for each in doctor.packages(lines, {"lark": "1.3", "numpy": "1.2"}.get)}
+    assert {name: each.wrong for name, each in found.items() if each.wrong} == {
+        "numpy": "1.26 or later is needed",
+        "pluggy": "pip install 'pluggy'",
+    }
+    assert {*found} == {"lark", "numpy", "pluggy", *doctor.EXTRAS}
 
 
 def test_a_disk_that_is_full(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -75,7 +63,7 @@ def test_a_folder_that_cannot_be_written_to(ncfix: Any, monkeypatch: pytest.Monk
     def locked(*_: Any, **more: Any) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(doctor.tempfile, "TemporaryDirectory", locked)
+    monkeypatch.setattr("tempfile.TemporaryDirectory", locked)
     assert "not writable: Permission denied" in ncfix("doctor").out.decode()
 
 

@@ -7,7 +7,7 @@ import platform
 import re
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from importlib.metadata import PackageNotFoundError, metadata, version
 from pathlib import Path
 
@@ -54,7 +54,7 @@ def findings() -> Iterator[HostFinding]:
     python = f"{platform.python_version()}, {sys.executable}"
     yield HostFinding("Python", python, "" if sys.version_info >= OLDEST_PYTHON else "3.11 or later is needed")
     yield HostFinding("computer", f"{platform.platform()}, {console.counted(host.processors(), 'processor')} available")
-    yield from _packages()
+    yield from packages(_requirements(), _version)
     stale = core.fault() and core.has_binary()  # it is not of these sources
     yield HostFinding("core", core.status(), core.fault() if stale else "")
     yield from _plugins()
@@ -65,15 +65,18 @@ def findings() -> Iterator[HostFinding]:
     yield HostFinding("environment", ", ".join(f"{name}={os.environ[name]}" for name in settings) or "no NCFIX_...")
 
 
-def _packages() -> Iterator[HostFinding]:
-    """The packages that ncfix needs, and those of its extras."""
+def packages(requirements: Iterable[str], version_of: Callable[[str], str | None]) -> Iterator[HostFinding]:
+    """The packages that ncfix needs, and those of its extras.
+
+    version_of  the installed version of a package, None for none
+    """
     least: dict[str, str] = {}
-    for line in _requirements():
+    for line in requirements:
         found = NEEDS.match(line)
         if found and not found[3]:
             least[found[1]] = found[2] or ""
     for name, wanted in least.items():
-        there = _version(name)
+        there = version_of(name)
         if there is None:
             yield HostFinding(name, "not installed", f"pip install '{name}{f'>={wanted}' if wanted else ''}'")
         elif _numbers(there) < _numbers(wanted):
@@ -81,7 +84,7 @@ def _packages() -> Iterator[HostFinding]:
         else:
             yield HostFinding(name, there)
     for name, (extra, without) in EXTRAS.items():
-        there = _version(name)
+        there = version_of(name)
         yield HostFinding(name, there or f"not installed (extra {extra}): {without}")
 
 
