@@ -76,6 +76,9 @@ def test_what_is_not_plain_has_no_order(language: str, text: str) -> None:
     ("language", "text"),
     [
         ("siemens", "A1:|GOTOB A1"),
+        ("siemens", "R1=0|A1:|R1=R1+1|IF R1>1 GOTOF A2|REPEAT A1 P=3|A2:"),
+        ("siemens", "A1:|REPEAT A1 P=-1"),
+        ("siemens", "A1:|REPEAT A1 P=R7"),
         ("siemens", "IF R7==1 GOTOF A1|A1:"),
         ("siemens", "R1=0.1+0.2|A1:|IF R1==0.3000001 GOTOB A1"),
         ("fanuc", "GOTO 1|N1 M99"),
@@ -125,3 +128,9 @@ def test_a_fault_in_a_loop_is_found(language: str) -> None:
     words = {"heidenhain": ("X+50.47", "X+50.49"), "siemens": ("X50.47", "X50.49"), "fanuc": ("X50.47", "X50.49")}
     found = proved(language, LOOPS[language], words[language])
     assert len(found.faults) == 1, found.faults
+
+
+def test_a_motion_that_is_another_one_each_time_is_not_proved() -> None:
+    found = proved("heidenhain", "LBL 1|L IX+1 F500|CALL LBL 1 REP 6|M30|END PGM A MM")
+    assert found.faults == []
+    assert found.reasons["a motion that is made in more ways than this reader looks at"] == 1
