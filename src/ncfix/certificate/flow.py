@@ -80,7 +80,9 @@ class LineOrder:
 
     @classmethod
     def of(cls, text: Text) -> LineOrder | None:
-        """The order of a program; None if no line directs the flow, or if a line that does is not plain."""
+        """The order of a program; None if no line directs the flow, one that does is not plain, or it has many lines."""
+        if len(text.lines) > MOST_LINES:
+            return None
         odd = {row for row, line in text.apart() if line.odd is JUMPS}
         if not odd and not (text.family is Family.WORDS and SUBPROGRAM.search(text.source)):
             return None
