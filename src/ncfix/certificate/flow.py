@@ -80,7 +80,7 @@ class LineOrder:
 
     @classmethod
     def of(cls, text: Text) -> LineOrder | None:
-        """The order of a program; None if no line directs the flow, one that does is not plain, or it has many lines."""
+        """The order of a program; None if no line directs the flow, one that does is not plain, or the text is long."""
         if len(text.lines) > MOST_LINES:
             return None
         odd = {row for row, line in text.apart() if line.odd is JUMPS}
