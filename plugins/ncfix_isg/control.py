@@ -63,7 +63,7 @@ MOST_NODES = 1_000_000
 AXES = SettingForm(
     "axes of X, Y and Z, each once", lambda text: sorted(text.upper()) == sorted({*text.upper()} & {*LINEAR})
 )
-ONE = 3
+MAX_SINGLE_GRID_INPUTS = 3
 """Largest number of inputs for which a single grid is used."""
 
 
@@ -226,7 +226,7 @@ class GridSet:
 def _grid_set(volume: Volume, target: float, most: int, how: str) -> GridSet:
     """One grid, or several whose sum is the correction."""
     found = None
-    if how == "sum" or (how == "auto" and len(volume.inputs) > ONE):
+    if how == "sum" or (how == "auto" and len(volume.inputs) > MAX_SINGLE_GRID_INPUTS):
         found = faces(volume, [volume.inputs.index(axis) for axis in LINEAR], target)
     if found is None:
         mesh = search(volume, target, [most] * len(volume.inputs), most)

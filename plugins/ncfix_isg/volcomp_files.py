@@ -46,9 +46,9 @@ PARAMETER = re.compile(r"E[XYZABC]0?[XYZABC]")
 POSITION = re.compile(r"E([XYZ])([XYZABC])")
 HEAD_LINES = 100
 """Number of lines among which the header is searched."""
-LARGE = 1.0
+MAX_ERROR_MM = 1.0
 """Largest plausible error, mm; a larger one probably has a wrong unit."""
-STEEP = 0.01
+MAX_SLOPE = 0.01
 """Largest plausible slope of an error, mm per mm or degree."""
 Words = tuple[int, list[str]]
 SCREW_UNIT = 1e-4
@@ -337,7 +337,7 @@ def _grids(
         )
         remarks.refuse(0, f"{text} (error 70471)", "GRID needs every combination of the positions once")
         return []
-    for row in np.flatnonzero(np.abs(values).max(axis=1) > LARGE)[:1]:
+    for row in np.flatnonzero(np.abs(values).max(axis=1) > MAX_ERROR_MM)[:1]:
         text = f"an error of {np.abs(values[row]).max():g} mm, which no machine has"
         remarks.refuse(lines[row], text, "values are in mm, not um")
     ordered = np.zeros((*counts, len(outputs)))
@@ -356,7 +356,7 @@ def _look_for_jumps(remarks: Remarks, nodes: Sequence[Array], values: Array) -> 
         if len(line) > 1:
             steps = np.diff(line).reshape([-1 if i == axis else 1 for i in range(values.ndim)])
             slope = float(np.abs(np.diff(values, axis=axis) / steps).max())
-            if slope > STEEP:
+            if slope > MAX_SLOPE:
                 remarks.doubt(0, f"an error changes by {slope:.3g} mm per unit along input {axis + 1}", "a slip?")
 
 

@@ -40,13 +40,13 @@ from ncfix.plugin import (
 from ncfix.tables.table_files import ALONE, DEGREE, NUMBER, ORDER, TURNING
 from ncfix.values import frozen
 
-MOST = 256
+MAX_POINTS = 256
 """Largest number of points: EMCMOT_COMP_SIZE of LinuxCNC."""
-LONGEST = 255
+MAX_LINE_CHARACTERS = 255
 """Largest number of characters of a line that LinuxCNC's reader accepts."""
-STEEP = 0.01
+MAX_SLOPE = 0.01
 """Slope of a correction above which it looks like a typing error; real screws stay below a thousandth."""
-LARGE = 1.0
+MAX_CORRECTION = 1.0
 """Largest plausible correction, mm or degree."""
 GAP = r"(?:\s+|(?=[-+]))"
 """Separator of two numbers as sscanf accepts it."""
@@ -208,8 +208,8 @@ def _joint(
 def _table(remarks: Remarks, number: int, axis: str, measured: bool, scale: float) -> JointTable | None:
     remarks.doubt_end()
     rows = np.array(list(_triples(remarks)), dtype=np.float64).reshape(-1, 3)
-    if len(rows) > MOST:
-        remarks.refuse(MOST + 1, f"{len(rows)} points, and LinuxCNC holds {MOST}")
+    if len(rows) > MAX_POINTS:
+        remarks.refuse(MAX_POINTS + 1, f"{len(rows)} points, and LinuxCNC holds {MAX_POINTS}")
     if len(rows) < 2:
         remarks.refuse(0, f"{len(rows)} points")
         return None
@@ -227,7 +227,7 @@ def _table(remarks: Remarks, number: int, axis: str, measured: bool, scale: floa
 
 def _too_large(remarks: Remarks, trims: Array, measured: bool, unit: str) -> bool:
     """Refuse the first implausibly large correction (of a file of the other type?); returns whether there is one."""
-    rows = np.flatnonzero(np.abs(trims).max(axis=1) > LARGE)
+    rows = np.flatnonzero(np.abs(trims).max(axis=1) > MAX_CORRECTION)
     if rows.size:
         size = trims[rows[0]][np.abs(trims[rows[0]]).argmax()]
         other = "1, corrections" if measured else "0, actual positions"
@@ -246,8 +246,8 @@ def _triples(remarks: Remarks) -> Iterator[tuple[float, float, float]]:
             what = "a blank line" if not row.strip() else "a decimal comma" if "," in row else "not three numbers"
             remarks.refuse(number, f"{what}: LinuxCNC stops reading here", "three numbers on every line, no comments")
             return
-        if len(row) > LONGEST:
-            remarks.refuse(number, f"longer than {LONGEST} characters")
+        if len(row) > MAX_LINE_CHARACTERS:
+            remarks.refuse(number, f"longer than {MAX_LINE_CHARACTERS} characters")
         if match[4].startswith(","):
             remarks.refuse(number, "a decimal comma: LinuxCNC takes what is before it for the whole number")
         elif match[4].strip():
@@ -262,7 +262,7 @@ def _triples(remarks: Remarks) -> Iterator[tuple[float, float, float]]:
 def _look_for_jumps(remarks: Remarks, steps: Array, trims: Array) -> None:
     """Remark on points where the correction changes faster than the error of a screw can."""
     slopes = np.abs(np.diff(trims, axis=0)).max(axis=1) / steps
-    for row in np.flatnonzero(slopes > STEEP):
+    for row in np.flatnonzero(slopes > MAX_SLOPE):
         text = f"the correction changes by {slopes[row]:.3g} per unit of length from the line before"
         remarks.doubt(int(row) + 2, text, "a slip of the digits?")
 
@@ -281,7 +281,7 @@ class LinuxCnc(Control):
         quantum=(1e-6, 1e-6 * DEGREE),
         extrapolation="the value of the first or last point is held",
         bidirectional=True,
-        max_points=MOST,
+        max_points=MAX_POINTS,
         max_tables=9,
         combine="one file for each joint",
     )
@@ -305,7 +305,7 @@ class LinuxCnc(Control):
     options: ClassVar[Mapping[str, Option]] = {
         "type": Option("1", "COMP_FILE_TYPE: 1 corrections, 0 actual positions", one_of("0", "1")),
         "coordinates": Option("", "axis letters in the order of the joints, e.g. XYZBC"),
-        "points": Option(str(MOST), "most points of one file, at most 256", whole(2, MOST)),
+        "points": Option(str(MAX_POINTS), "most points of one file, at most 256", whole(2, MAX_POINTS)),
         "unit": Option("mm", "LINEAR_UNITS of the machine: mm or inch", one_of("mm", "inch")),
     }
     steps = (

@@ -75,7 +75,7 @@ class WholeFile:
             yield part
 
 
-def read_bytes(path: str, most: int = inputs.MOST) -> bytes:
+def read_bytes(path: str, most: int = inputs.MAX_BYTES) -> bytes:
     """The content of a file of at most `most` bytes; raises `SourceError` NCF002."""
     try:
         return inputs.taken(path, most)

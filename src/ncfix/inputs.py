@@ -17,11 +17,11 @@ from typing import IO
 
 from ncfix.diagnostics import Place, UsageError
 
-MOST = 1 << 30
+MAX_BYTES = 1 << 30
 """Largest number of bytes of a program or a measurement read as a whole or through a pipe: some ten million blocks."""
-MOST_SAID = 1 << 26
+MAX_CONFIG_BYTES = 1 << 26
 """Largest number of bytes of files that people write: machine files, setups, tool tables."""
-AT_ONCE = 1 << 20
+PIPE_CHUNK_BYTES = 1 << 20
 """Number of bytes read from a pipe at once."""
 WAIT_S = 5.0
 """Time, s, to wait for a writer of a named pipe."""
@@ -57,9 +57,9 @@ def check(handle: IO[bytes], own: bool = True) -> None:
     _check(os.fstat(number), own and os.isatty(number))
 
 
-def content(handle: IO[bytes], most: int = MOST) -> bytes:
+def content(handle: IO[bytes], most: int = MAX_BYTES) -> bytes:
     """The remaining content of an open file. Raises OSError if it is more than `most` bytes."""
-    size = AT_ONCE
+    size = PIPE_CHUNK_BYTES
     if (known := _size(handle)) is not None:
         check_size(known, most)
         size = max(size, known + 1)
@@ -71,13 +71,13 @@ def content(handle: IO[bytes], most: int = MOST) -> bytes:
     return parts[0] if len(parts) == 1 else b"".join(parts)
 
 
-def check_size(count: int, most: int = MOST) -> None:
+def check_size(count: int, most: int = MAX_BYTES) -> None:
     """Raise OSError if `count` bytes are more than `most`."""
     if count > most:
         raise OSError(errno.EFBIG, f"it has more than {most >> 20} MB")
 
 
-def taken(path: str, most: int = MOST) -> bytes:
+def taken(path: str, most: int = MAX_BYTES) -> bytes:
     """The content of a file. Raises OSError with the words of the system or plain ones."""
     with opened(path) as handle:
         return content(handle, most)

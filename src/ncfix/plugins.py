@@ -134,7 +134,7 @@ def leave(plugin: str, source: str, kind: str, name: str, why: str) -> None:
     report(Message("NCF508", text, hint="tell its author; docs/plugins.md says what each hook registers"))
 
 
-LONG = 7
+MIN_WORD_LETTERS = 7
 """Smallest number of letters of a title's word that is compared: names of makes and controls (`sinumerik`)."""
 
 
@@ -149,7 +149,11 @@ def nearest(name: str, known: Iterable[str]) -> str:
     close = get_close_matches(lower, names, 1)
     if not close and isinstance(known, Mapping):
         titles = {each: str(getattr(known[each], "title", "")).lower() for each in names}
-        close = [each for each in names if any(len(word) >= LONG and word in lower for word in titles[each].split())]
+        close = [
+            each
+            for each in names
+            if any(len(word) >= MIN_WORD_LETTERS and word in lower for word in titles[each].split())
+        ]
     return f"did you mean {close[0]}?" if close else f"there are {', '.join(names)}"
 
 

@@ -28,7 +28,7 @@ from typing import Any
 
 from ncfix.diagnostics import ConfigError, Message
 from ncfix.files import read_bytes
-from ncfix.inputs import MOST_SAID
+from ncfix.inputs import MAX_CONFIG_BYTES
 from ncfix.toml_text import decoded, key_lines, line_of, parsed, place_of
 from ncfix.toml_text import written as table_written
 from ncfix.values import frozen
@@ -71,7 +71,7 @@ class Project:
     @classmethod
     def load(cls, path: str) -> Project:
         """Read a project file; raises SourceError NCF002, or ConfigError NCF028 with everything that is wrong in it."""
-        text = decoded(read_bytes(path, MOST_SAID), path, CODE)
+        text = decoded(read_bytes(path, MAX_CONFIG_BYTES), path, CODE)
         content = parsed(text, path, CODE, "docs/formats.md shows a project file")
         project = cls(path, os.path.dirname(path), content, text)
         if faults := list(project._faults()):

@@ -39,7 +39,7 @@ OTHERS = {
 """Beginnings of other files that may be given instead of TOML."""
 WIDTH = 120
 """Largest number of characters of a written line."""
-LARGEST = 1e12
+MAX_NUMBER = 1e12
 """Largest absolute value of a number, in any unit: no quantity of a machine is larger, and arithmetic stays safe."""
 
 
@@ -343,9 +343,9 @@ class TomlTable:
         if isinstance(value, float) and not math.isfinite(value):
             self.note(self.report.codes.number, key, f"{value} is not a finite number")
             return False
-        if abs(value) > LARGEST:
+        if abs(value) > MAX_NUMBER:
             self.note(
-                self.report.codes.number, key, f"more than anything that a machine has, which is {LARGEST:g} at most"
+                self.report.codes.number, key, f"more than anything that a machine has, which is {MAX_NUMBER:g} at most"
             )
             return False
         return True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ncfix.cli.console import MOST, keeping, said_once, tell_some
+from ncfix.cli.console import MAX_MESSAGES_PER_CODE, keeping, said_once, tell_some
 from ncfix.diagnostics import Message, Place, lines_named
 
 
@@ -56,7 +56,9 @@ def test_many_stretches_are_only_bounded() -> None:
 
 def test_of_many_that_say_something_else_the_first_are_said_and_the_rest_is_counted() -> None:
     with keeping() as lines:
-        tell_some([message for line in range(1, MOST + 31) for message in said(line, text=f"axis {line}")])
+        tell_some(
+            [message for line in range(1, MAX_MESSAGES_PER_CODE + 31) for message in said(line, text=f"axis {line}")]
+        )
     text = "\n".join(lines)
-    assert text.count(" axis ") == MOST
+    assert text.count(" axis ") == MAX_MESSAGES_PER_CODE
     assert " and 30 more like these" in text

@@ -252,7 +252,7 @@ def test_a_reason_that_many_programs_have_is_counted(
 ) -> None:
     from ncfix.cli import console
 
-    monkeypatch.setattr(console, "MOST", 2)
+    monkeypatch.setattr(console, "MAX_MESSAGES_PER_CODE", 2)
     for number in range(5):
         (parts / f"bad{number}.ngc").write_bytes(b"G1 X1 Y..2\nM2\n")
     said = ncfix("fix", parts, "-m", shop.machine, "--assume-zero", "-o", shop.folder / "out", "-q").err.splitlines()[

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from ncfix.control.flow import ENDLESS as CODE
-from ncfix.control.flow import MOST, NEVER_ENDS, WAITS, Recurrence
+from ncfix.control.flow import MAX_JUMPS_REMEMBERED, NEVER_ENDS, WAITS, Recurrence
 from ncfix.control.moves import Moves, Rule
 from ncfix.control.setup import Setup, Tool
 from ncfix.control.trace import trace
@@ -163,5 +163,5 @@ def test_a_jump_is_another_when_something_has_changed() -> None:
 
 def test_jumps_are_forgotten_when_they_are_many() -> None:
     recurrence = Recurrence()
-    assert not any(recurrence.seen(jump, 0) for jump in range(MOST + 5))
-    assert len(recurrence.made) <= MOST
+    assert not any(recurrence.seen(jump, 0) for jump in range(MAX_JUMPS_REMEMBERED + 5))
+    assert len(recurrence.made) <= MAX_JUMPS_REMEMBERED

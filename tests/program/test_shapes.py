@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ncfix.text import shapes
-from ncfix.text.shapes import KINDS, LONG, Scan, distinct, scan_any, split_blocks
+from ncfix.text.shapes import KINDS, MAX_KEY_BYTES, Scan, distinct, scan_any, split_blocks
 
 
 def lines(rng: np.random.Generator, kinds: int, longest: int, n: int) -> list[bytes]:
@@ -18,13 +18,13 @@ def lines(rng: np.random.Generator, kinds: int, longest: int, n: int) -> list[by
 
 
 @pytest.mark.parametrize("kinds", [1, 3, KINDS, 5 * KINDS])
-@pytest.mark.parametrize("longest", [1, 7, 9, LONG - 1, LONG + 2, 3 * LONG])
+@pytest.mark.parametrize("longest", [1, 7, 9, MAX_KEY_BYTES - 1, MAX_KEY_BYTES + 2, 3 * MAX_KEY_BYTES])
 def test_each_line_is_its_kind(kinds: int, longest: int) -> None:
     given = lines(np.random.default_rng(kinds), kinds, longest, 500)
     shapes, group = distinct(b"".join(line + b"\n" for line in given))
     assert [shapes[k] for k in group.tolist()] == given
     assert set(group.tolist()) == set(range(len(shapes)))
-    if kinds <= KINDS and longest <= LONG + 1:
+    if kinds <= KINDS and longest <= MAX_KEY_BYTES + 1:
         assert len(shapes) == len(set(given))
 
 

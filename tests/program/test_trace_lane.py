@@ -31,12 +31,12 @@ ASSUMED = Setup(assume_zero=True)
 @contextmanager
 def stretches_of(shortest: int) -> Iterator[None]:
     """Which stretches go through the fast lane; a negative number: compiled if that is installed."""
-    before, lane.SHORTEST = lane.SHORTEST, abs(shortest)
+    before, lane.MIN_STRETCH_BLOCKS = lane.MIN_STRETCH_BLOCKS, abs(shortest)
     core.use(None if shortest < 0 else "plain")
     try:
         yield
     finally:
-        lane.SHORTEST = before
+        lane.MIN_STRETCH_BLOCKS = before
         core.use(None)
 
 
@@ -116,7 +116,7 @@ def test_both_lanes_are_the_same(seed: int, dialect: str) -> None:
     head = "G0 F100 X0 Y0 Z0 B0 C0" if random.random() < 0.8 else "G0 X1"
     text = "\n".join([head, *(block for part in parts for block in part)])
     setup = random.choice([KNOWN, Setup(assume_zero=True, no_point="calculator")])
-    assert_same(text, dialect, setup, random.choice([ALWAYS, 4, lane.SHORTEST]))
+    assert_same(text, dialect, setup, random.choice([ALWAYS, 4, lane.MIN_STRETCH_BLOCKS]))
 
 
 def without_a_word(random: Random, block: str) -> str:
@@ -233,7 +233,7 @@ JUMPS = {
 
 
 @pytest.mark.parametrize("body", JUMPS.values(), ids=list(JUMPS))
-@pytest.mark.parametrize("shortest", [4, lane.SHORTEST])
+@pytest.mark.parametrize("shortest", [4, lane.MIN_STRETCH_BLOCKS])
 def test_jumps_back_lead_where_they_should(body: list[str], shortest: int) -> None:
     text = "\n".join(["#9=0", *body, "#9=#9+1", "IF[#9LT3]GOTO50"])
     one, other = (columns(text, length, "fanuc", Setup(assume_zero=True)) for length in (shortest, NEVER))
@@ -248,7 +248,7 @@ def test_a_subprogram_before_what_was_looked_at_is_taken_as_it_is_written() -> N
     main = ["G1 F100 X5 Y6", "X1", "Z3 X1", *(f"X{100 + i}" for i in range(14)), "o9 call", "o9 call"]
     one, other = (
         columns("\n".join([*sub, *main]), length, "linuxcnc", Setup(assume_zero=True))
-        for length in (lane.SHORTEST, NEVER)
+        for length in (lane.MIN_STRETCH_BLOCKS, NEVER)
     )
     assert not isinstance(one, str)
     assert not isinstance(other, str)
@@ -263,7 +263,7 @@ def test_motions_of_subprogram_files_and_behind_their_calls(dialect: str) -> Non
     call, end, file = CALLS[dialect]
     lines = [f"X{i}." for i in range(20)]
     text, sub = "\n".join(["G1 F100. X5. Y6.", *lines, call, *lines]), "\n".join([*lines, end, ""])
-    with stretches_of(lane.SHORTEST):
+    with stretches_of(lane.MIN_STRETCH_BLOCKS):
         moves = follow(text, setup=Setup(assume_zero=True), dialect=dialect, files={file: sub}).moves
     assert moves.block.tolist() == [*range(21), *[21] * 20, *range(22, 42)]
     assert [bool(rule == Rule.CORRECT) for rule in moves.rule] == [block != 21 for block in moves.block]
@@ -271,7 +271,7 @@ def test_motions_of_subprogram_files_and_behind_their_calls(dialect: str) -> Non
 
 def test_the_lane_takes_what_it_should() -> None:
     text = "G0 X0 Y0 Z0 B0 C0\n" + "\n".join(f"G1 X{i} F100" for i in range(100))
-    with stretches_of(lane.SHORTEST):
+    with stretches_of(lane.MIN_STRETCH_BLOCKS):
         moves = follow(text, "XYZBC").moves
     assert moves.end[1:, 0].tolist() == list(range(100))
     assert np.array_equal(moves.start[1:], moves.end[:-1])

@@ -20,8 +20,8 @@ from ncfix.control.arcs import CLOCKWISE, COUNTER, Point, centre_from_radius, ch
 from ncfix.control.builder import Circles, MotionColumns
 from ncfix.control.coordinates import DEGREE, IDENTITY, PLANES, X, Y, Z
 from ncfix.control.expressions import Fault
-from ncfix.control.lanes.block_rows import LONGEST, filled, followed, words
-from ncfix.control.lanes.lane import SHORTEST, before_placing
+from ncfix.control.lanes.block_rows import MAX_BLOCKS_AT_ONCE, filled, followed, words
+from ncfix.control.lanes.lane import MIN_STRETCH_BLOCKS, before_placing
 from ncfix.control.moves import Arc, FeedMode, MotionKind
 from ncfix.values import frozen
 from ncfix_heidenhain.klartext.arcs import BAD_ARC, FLAT, direction_at_end
@@ -69,14 +69,14 @@ def run_lane(control: KlartextControl, unit: KlartextUnit, block: int) -> tuple[
     if not is_open(control):
         return 0, block + 1
     end = unit.lane_end(block)
-    stop = before_corner(unit, block, min(end, block + LONGEST))
+    stop = before_corner(unit, block, min(end, block + MAX_BLOCKS_AT_ONCE))
     stop = before_placing(control, unit.lanes.words.mask[unit.program.template[block:stop]], block)
-    if stop - block < SHORTEST:
+    if stop - block < MIN_STRETCH_BLOCKS:
         return 0, min(stop, end) + 1
     stage = stage_of(control, unit, block, stop)
     stage = stage.head(min(count_on_one_turn(control, stage), count_beside(control, stage)))
     circles, count = circles_of(control, unit, block, stage.path, stage.motion)
-    if count < SHORTEST:
+    if count < MIN_STRETCH_BLOCKS:
         return 0, block + count + 1
     take(control, stage.head(count), unit, block, circles)
     return count, block + count

@@ -35,7 +35,7 @@ from ncfix.control.frames import (
     turned_in,
 )
 from ncfix.control.moves import AT_START, Motion, MotionEnd, MotionKind, Pass, Passing
-from ncfix.control.posture import AT_ZERO, WayRules, normal_of
+from ncfix.control.posture import MIN_SIGNED_RAD, WayRules, normal_of
 from ncfix.control.tcp import switch
 from ncfix_heidenhain.klartext.control import MOVED_ALONG, PRESET, TILTED, KlartextControl
 from ncfix_heidenhain.klartext.targets import MotionWords
@@ -442,7 +442,7 @@ def chosen_way(control: KlartextControl, tilt: Rotation | None, flags: frozenset
         return None
     if found.at_pole:
         turned = "table rot" in flags and tilt is not None and tilt != IDENTITY
-        at_zero = abs(found.ways[0][0]) < AT_ZERO
+        at_zero = abs(found.ways[0][0]) < MIN_SIGNED_RAD
         return found.chosen if at_zero and not turned else None
     if len(found.ways) > 1:
         control.warn(WAY, f"the rotary axes are taken to turn to {found}, the nearest of several ways", WAY_HINT)
@@ -453,7 +453,7 @@ def way_home(control: KlartextControl) -> dict[int, float] | None:
     """Where PLANE RESET with TURN or MOVE takes the rotary axes: to zero; None if their datum is shifted."""
     if any(control.offset[index] for index in control.turning):
         return None
-    if any(index in control.unknown or abs(control.position[index]) > AT_ZERO for index in control.turning):
+    if any(index in control.unknown or abs(control.position[index]) > MIN_SIGNED_RAD for index in control.turning):
         control.warn(WAY, HOME, "state the rotary axes in the next block")
     return dict.fromkeys(control.turning, 0.0)
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from ncfix.arrays import Array
 from ncfix.control.arcs import CLOCKWISE
-from ncfix.text.spelling import ROUNDED, Spelling, value_of
+from ncfix.text.spelling import MAX_ROUNDING_HALF_STEPS, Spelling, value_of
 from ncfix.text.tree import Program, Word
-from ncfix.writer.block import EXACT, BlockWriter
+from ncfix.writer.block import EQUALITY_TOLERANCE, BlockWriter
 from ncfix.writer.target import Target
 from ncfix_heidenhain.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text, is_relied_on, pole_in_force
 from ncfix_heidenhain.klartext.control import BY_DEPTH, FROM_START
@@ -99,7 +99,7 @@ class KlartextWriter(BlockWriter):
         if arc and (np.abs(target.centre - target.original_centre) >= self.half[target.spatial[0]]).any():
             return False
         began = np.array([target.start[column] if column >= 0 else 0.0 for column in target.spatial])
-        if (np.abs(began - target.origin) >= EXACT).any():
+        if (np.abs(began - target.origin) >= EQUALITY_TOLERANCE).any():
             return False
         return name not in BY_PATH or not poles_move(self.program.source)
 
@@ -133,7 +133,9 @@ class KlartextWriter(BlockWriter):
         target = self.target
         ends, nominal = target.ends[:, column].tolist(), float(target.nominal[column])
         here = abs(ends[0] - float(target.start[column]))
-        return here <= ROUNDED * self.half[column] and all(abs(end - nominal) < UNCORRECTED for end in ends)
+        return here <= MAX_ROUNDING_HALF_STEPS * self.half[column] and all(
+            abs(end - nominal) < UNCORRECTED for end in ends
+        )
 
     def _reachable(self, column: int, end: float, piece: int = 0) -> float:
         """The position of an axis at the end of a piece; for a rotary axis as `on_its_side` limits it."""
@@ -198,7 +200,7 @@ class KlartextWriter(BlockWriter):
         else:
             self._axis_words(position, found.end)
             self._function(found.function)
-        if closed and (np.abs(position - target.start)[arc.columns] > EXACT).any():
+        if closed and (np.abs(position - target.start)[arc.columns] > EQUALITY_TOLERANCE).any():
             self.out.conflict = NOT_CLOSED
         for word in layout.polar:
             self._remove(word)

@@ -30,10 +30,10 @@ from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z, mask_of, product
 from ncfix.control.expressions import Fault, number
 from ncfix.control.frames import WORLD, Affine, projected, shifted, turned
 from ncfix.control.lanes.block_rows import BlockRows, stage_of
-from ncfix.control.lanes.lane import SHORTEST, before_placing, is_open, take
+from ncfix.control.lanes.lane import MIN_STRETCH_BLOCKS, before_placing, is_open, take
 from ncfix.control.moves import FeedMode, MotionEnd, MotionKind, Pass, Passing
 from ncfix.control.pointing import Pointing, Triple, Ways, dot, nearest
-from ncfix.control.posture import FAR, WayRules, normal_of
+from ncfix.control.posture import MAX_PLANE_DEVIATION_RAD, WayRules, normal_of
 from ncfix.control.tcp import rotary_at_zero
 from ncfix.text.tree import StringLiteral
 from ncfix.values import frozen
@@ -176,7 +176,7 @@ TURNS = {
 def run_vectors(control: Sinumerik, unit: SinumerikUnit, block: int, main: bool) -> int:
     """Execute the stretch of blocks with vectors that begins with a block; the number of blocks executed."""
     stop = min(unit.vector_end(block), block + LONGEST)
-    if stop - block < SHORTEST or not is_ready(control) or not is_open(control, unit, block):
+    if stop - block < MIN_STRETCH_BLOCKS or not is_ready(control) or not is_open(control, unit, block):
         return 0
     pointing = control.posture.pointing
     assert pointing is not None
@@ -184,15 +184,15 @@ def run_vectors(control: Sinumerik, unit: SinumerikUnit, block: int, main: bool)
     turning = 1 << letters[0] | 1 << letters[1]
     mask = unit.lanes.mask[unit.program.template[block:stop]] | turning
     stop = before_placing(control, mask, block)
-    if stop - block < SHORTEST:
+    if stop - block < MIN_STRETCH_BLOCKS:
         return 0
-    ways = unit.directions.known(pointing, unit, block, stop, SHORTEST)
-    if len(ways) < SHORTEST:
+    ways = unit.directions.known(pointing, unit, block, stop, MIN_STRETCH_BLOCKS)
+    if len(ways) < MIN_STRETCH_BLOCKS:
         return 0
     stage = stage_of(control, unit, block, block + len(ways))
     stage = replace(stage, mask=mask[: len(ways)])
     count = turn(control, pointing, letters, ways, stage)
-    if count < SHORTEST:
+    if count < MIN_STRETCH_BLOCKS:
         return 0
     control.points = True
     control.builder.says_the_way(turning, count)
@@ -220,7 +220,9 @@ def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Seque
     at_will = True
     for both, is_even in zip(ways, even, strict=True):
         nearer = nearest(both, here)
-        if (at_will and pointing.leaves_pole(here, nearer)) or not (is_even or pointing.stray(here, nearer[0]) <= FAR):
+        if (at_will and pointing.leaves_pole(here, nearer)) or not (
+            is_even or pointing.stray(here, nearer[0]) <= MAX_PLANE_DEVIATION_RAD
+        ):
             break
         outer, inner = nearer[0]
         here = (

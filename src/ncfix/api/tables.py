@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from ncfix.tables.export import Exported
     from ncfix.text.tree import Program
 
-SAME = 0.5
+EQUAL_LENGTHS_MM = 0.5
 """Largest difference, mm, of tool lengths that count as equal for tables."""
-MANY = 4
+MAX_LENGTHS_LISTED = 4
 """Number of tool lengths listed in a remark."""
 INSTEAD = "give the original program, or run this one without tables"
 
@@ -196,8 +196,10 @@ def with_program(
     remarks: tuple[str, ...] = ()
     if not control.any_tool and machine.depends_on_tool_length:
         used = moves.tool_length[np.isfinite(moves.tool_length)].tolist()
-        others = sorted({round(each, 3) for each in used if abs(each - manifest.tool_length) > SAME})
-        listed = ", ".join(f"{each:g}" for each in others[:MANY]) + (" ..." if len(others) > MANY else "")
+        others = sorted({round(each, 3) for each in used if abs(each - manifest.tool_length) > EQUAL_LENGTHS_MM})
+        listed = ", ".join(f"{each:g}" for each in others[:MAX_LENGTHS_LISTED]) + (
+            " ..." if len(others) > MAX_LENGTHS_LISTED else ""
+        )
         if others:
             for_tool = f"The tables hold for a tool of {manifest.tool_length:g} mm"
             remarks = (f"{for_tool}; this program also runs with {listed} mm.",)

@@ -33,7 +33,7 @@ FIGURE = re.compile(r"(?<![-.\w])\d+(?:\.\d+)?(?:e[-+]\d+)?(?= (?:mm|um|degrees|
 SCHEMA = 1
 """Schema version of the objects printed with `--json`."""
 CODE = re.compile(r"\bNCF\d{3}:")
-MOST = 20
+MAX_MESSAGES_PER_CODE = 20
 """Largest number of messages of one code that are printed."""
 BUSY_AFTER_S = 2.0
 """Time, s, after which progress is shown on a terminal."""
@@ -128,7 +128,7 @@ def tell(*messages: Message) -> None:
 
 
 def tell_some(messages: Iterable[Message], shown: Callable[[list[Message]], Iterable[Message]] = list) -> None:
-    """Print coded messages, equal ones merged, at most `MOST` of each code; the number of further ones is printed.
+    """Print coded messages, equal ones merged. Beyond `MAX_MESSAGES_PER_CODE`, only their number is printed.
 
     shown  selects or changes the messages before they are printed
     """
@@ -136,12 +136,12 @@ def tell_some(messages: Iterable[Message], shown: Callable[[list[Message]], Iter
     first = []
     for message in said_once(messages):
         seen[message.code] += 1
-        if seen[message.code] <= MOST:
+        if seen[message.code] <= MAX_MESSAGES_PER_CODE:
             first.append(message)
     tell(*shown(first))
     for code, count in seen.items():
-        if count > MOST:
-            tell(Message(code, f"and {count - MOST} more like these", hint="--json lists all"))
+        if count > MAX_MESSAGES_PER_CODE:
+            tell(Message(code, f"and {count - MAX_MESSAGES_PER_CODE} more like these", hint="--json lists all"))
 
 
 def put(data: str | bytes) -> None:

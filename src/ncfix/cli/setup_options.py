@@ -238,9 +238,9 @@ class SetupOptions:
             setup = load(self.setup_file)
         tools, named = dict(setup.tools), dict(setup.named_tools)
         if self.tool_table is not None:
-            from ncfix.control.tool_files.tables import ASIDE, load_tool_table, may_be_in_inches
+            from ncfix.control.tool_files.tables import OTHER_AXES, load_tool_table, may_be_in_inches
 
-            axes = ASIDE if machine is None else machine.axis_names
+            axes = OTHER_AXES if machine is None else machine.axis_names
             found = load_tool_table(self.tool_table, axes, self.tool_unit or "mm")
             if self.tool_unit is None and (doubt := may_be_in_inches(found)):
                 tell(Message("NCF386", doubt, Place(self.tool_table), "--tool-unit inch if it is, else --tool-unit mm"))

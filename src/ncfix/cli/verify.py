@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 Said = tuple[Sequence[Message], ...]
 """Messages from following the original and the corrected program."""
-FEW = 5
+MAX_LINES_LISTED = 5
 """Largest number of lines that are listed by number."""
 
 
@@ -194,6 +194,6 @@ def unsure(limits: str) -> str:
 
 def lines_said(lines: Sequence[int]) -> str:
     """Lines, the first few by number: `lines 4 5 6 and 12 more`."""
-    few = " ".join(map(str, lines[:FEW]))
-    more = f" and {len(lines) - FEW} more" if len(lines) > FEW else ""
+    few = " ".join(map(str, lines[:MAX_LINES_LISTED]))
+    more = f" and {len(lines) - MAX_LINES_LISTED} more" if len(lines) > MAX_LINES_LISTED else ""
     return f"line{'s' if len(lines) > 1 else ''} {few}{more}"

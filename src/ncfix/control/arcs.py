@@ -17,16 +17,16 @@ CLOCKWISE, COUNTER = 20, 30
 """Motion codes of clockwise and counter-clockwise arcs (G2, G3), in tenths."""
 
 ARC_FAULT = "NCF220"
-ZERO_RADIUS = 0.00127
+MIN_RADIUS_MM = 0.00127
 """Smallest radius of an arc, mm, and largest distance by which an R arc may miss its end (LinuxCNC: 0.00005 inch)."""
 
-SEMICIRCLE = 1e-12
+SEMICIRCLE_TOLERANCE = 1e-12
 """An R arc whose half chord is within this relative distance of the radius is taken as a semicircle."""
 
-FUZZ = 1e-6
+MIN_SWEEP_RAD = 1e-6
 """Smallest sweep, rad: below it, an arc is a full circle."""
 
-HOPELESS = 100.0
+MAX_CLOSURE_FACTOR = 100.0
 """An arc that misses its end by more than this multiple of the closure tolerance is refused, whatever its radius."""
 
 
@@ -38,11 +38,11 @@ def check_closure(centre: Point, end: Point, absolute: float, relative: float) -
     """
     start_radius = math.hypot(*centre)
     end_radius = math.hypot(end[0] - centre[0], end[1] - centre[1])
-    if min(start_radius, end_radius) < ZERO_RADIUS:
+    if min(start_radius, end_radius) < MIN_RADIUS_MM:
         raise Fault(ARC_FAULT, "the arc has no radius: its centre is at its start or end")
     gap = abs(start_radius - end_radius)
     greater = max(start_radius, end_radius)
-    if gap > absolute * HOPELESS or (gap > absolute and gap > relative * greater):
+    if gap > absolute * MAX_CLOSURE_FACTOR or (gap > absolute and gap > relative * greater):
         raise Fault(
             ARC_FAULT,
             f"the arc does not close: its radius is {start_radius:.4f} mm at the start and {end_radius:.4f} mm"
@@ -56,10 +56,10 @@ def centre_from_radius(end: Point, radius: float, *, clockwise: bool) -> Point:
     chord = math.hypot(*end)
     if chord == 0.0:
         raise Fault(ARC_FAULT, "an arc given by R must end elsewhere than it starts", "a full circle needs I J K")
-    if chord / 2 - abs(radius) > ZERO_RADIUS or radius == 0.0:
+    if chord / 2 - abs(radius) > MIN_RADIUS_MM or radius == 0.0:
         raise Fault(ARC_FAULT, f"the radius {abs(radius):.4f} mm is too small to reach the arc's end")
     half = min(chord / 2, abs(radius))
-    if half / abs(radius) > 1 - SEMICIRCLE:
+    if half / abs(radius) > 1 - SEMICIRCLE_TOLERANCE:
         half = abs(radius)
     height = math.sqrt(max(radius * radius - half * half, 0.0))
     side = -1.0 if clockwise == (radius > 0) else 1.0
@@ -71,9 +71,9 @@ def sweep_angle(centre: Point, end: Point, turns: int, *, clockwise: bool) -> fl
     start_angle = math.atan2(-centre[1], -centre[0])
     end_angle = math.atan2(end[1] - centre[1], end[0] - centre[0])
     angle = start_angle - end_angle if clockwise else end_angle - start_angle
-    while angle < FUZZ:
+    while angle < MIN_SWEEP_RAD:
         angle += 2 * math.pi
-    if angle > 2 * math.pi + FUZZ:
+    if angle > 2 * math.pi + MIN_SWEEP_RAD:
         angle -= 2 * math.pi
     angle += 2 * math.pi * (turns - 1)
     return -angle if clockwise else angle

@@ -97,7 +97,7 @@ class Circles(NamedTuple):
     fixed: Mask
 
 
-BUFFERED = 65536
+BUFFERED_MOTIONS = 65536
 """Number of motions kept as Python numbers before they are converted to arrays."""
 
 
@@ -186,7 +186,7 @@ class MotionBuilder:
         buffer.end.extend(end)
         buffer.unplaced.append(unplaced)
         self.count += 1
-        if len(buffer.block) >= BUFFERED:
+        if len(buffer.block) >= BUFFERED_MOTIONS:
             self._flush()
 
     def arc(self, arc: Arc) -> None:

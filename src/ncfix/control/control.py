@@ -37,7 +37,7 @@ from ncfix.control.moves import (
     blanked,
     first_reason,
 )
-from ncfix.control.posture import FAR
+from ncfix.control.posture import MAX_PLANE_DEVIATION_RAD
 from ncfix.control.setup import Run
 from ncfix.control.state import TOOL_AT_RUN_TIME, ControlState
 from ncfix.control.tcp import in_machine
@@ -58,18 +58,18 @@ AS_A_WHOLE = "{} is corrected where it is called, down to its bottom; what it mi
 UNPLACED = "the program has not said where the axis {} stands, and this motion would need a word for it"
 """Why a motion that moves an axis without naming it is passed or refused."""
 
-RIGHT = 42
+CUTTER_RIGHT = 42
 """G42: cutter radius compensation to the right of the path."""
 NOT_ACCOUNTED = "nothing is known that the control would make of the word {} in this block"
 AFTER_THAT = "where the axis {{}} stands is not known after this: {}"
-FOLLOWED_IN_VAIN = 5000
+BLOCKS_AFTER_MISSING_AXIS = 5000
 """Blocks followed after the program has moved an axis that the machine lacks, to collect further missing data."""
 ASTRAY = "where the axis {} stands after motions that were not followed is not known"
 NO_UNIT = "NCF215"
 NO_UNIT_SAID = "the program does not say whether it is in inches or millimetres, and is taken as millimetres"
-NO_WAY = 1e-9
+MAX_AT_REST = 1e-9
 """Largest displacement, mm or rad, of an axis that is taken to stand still."""
-ALONG = 1 - 1e-12
+MIN_COSINE = 1 - 1e-12
 """A turned axis whose component along the machine axis is at least this counts as parallel to it."""
 
 
@@ -229,7 +229,7 @@ class ProgramControl(ControlState):
         """
         if self.foreign:
             self.followed_in_vain += 1
-            if self.followed_in_vain > FOLLOWED_IN_VAIN:
+            if self.followed_in_vain > BLOCKS_AFTER_MISSING_AXIS:
                 raise UsageError.collected(self.lacking)
         words, self.block_words = self.block_words, ()
         word = self.path_word(words) if words else ""
@@ -388,14 +388,14 @@ class ProgramControl(ControlState):
         way = [there - here for there, here in zip(motion.end.target, self.position, strict=True)]
         way = rotated(self.inverse, way) if self.is_rotated else way
         lacking = {*motion.end.unknown, *self.unknown}
-        still = mask_of(index for index in self.axis_indices if abs(way[index]) <= NO_WAY and index not in lacking)
+        still = mask_of(index for index in self.axis_indices if abs(way[index]) <= MAX_AT_REST and index not in lacking)
         across = still & ~plane if self.at_corner else 0
         return across | (plane if beside and plane & ~still == 0 else 0)
 
     def resting_of_many(self, words: Ints, starts: Array, ends: Array) -> Ints:
         """Like `_resting`, for motions with `words` (n,) from `starts` to `ends` (n, 9); not in a rotated frame."""
         columns = list(self.modal.plane.pair)
-        still = (np.abs(ends[:, columns] - starts[:, columns]) <= NO_WAY).all(axis=1)
+        still = (np.abs(ends[:, columns] - starts[:, columns]) <= MAX_AT_REST).all(axis=1)
         return np.where(still & (words & self.plane_axes != 0), self.plane_axes, 0)
 
     def end_compensation(self) -> None:
@@ -407,7 +407,7 @@ class ProgramControl(ControlState):
 
     def _turned(self) -> int:
         """Axes, as bits, that words of other axes move too, because the frame is rotated."""
-        return mask_of(i for i, row in enumerate(self.rotation) if i in self.axis_indices and abs(row[i]) < ALONG)
+        return mask_of(i for i, row in enumerate(self.rotation) if i in self.axis_indices and abs(row[i]) < MIN_COSINE)
 
     @contextmanager
     def in_one_piece(self) -> Iterator[None]:
@@ -437,7 +437,7 @@ class ProgramControl(ControlState):
             return False
         first, second = (self.axis_indices[column] for column in pointing.columns)
         here, there = ((place[first], place[second]) for place in (self.position, motion.end.target))
-        return pointing.stray(here, there) > FAR
+        return pointing.stray(here, there) > MAX_PLANE_DEVIATION_RAD
 
     def style_of(self, kind: MotionKind, code: int, unknown: UnknownAxes | None = None, refusal: str = "") -> int:
         """The style of a motion that is corrected, or refused if there is a reason.
@@ -497,4 +497,4 @@ class ProgramControl(ControlState):
         radius = self.tool_radius() if self.modal.compensated else 0.0
         if math.isnan(radius):
             return radius
-        return (-radius if self.modal.compensated == RIGHT else radius) * self.handedness
+        return (-radius if self.modal.compensated == CUTTER_RIGHT else radius) * self.handedness

@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from ncfix.control.setup import Setup
 
 TOO_LONG, NOT_FLAT = "NCF238", "NCF239"
-LINES = 500_000
+MAX_FLAT_LINES = 500_000
 """Largest number of lines of a flat program."""
 
 LEADING = (MotionKind.RAPID, MotionKind.CYCLE)
 """Motions whose end position does not depend on where they begin."""
 
-ROUNDINGS = 2.0
+MAX_DEVIATION_INCREMENTS = 2.0
 """Largest deviation of an end position, in least increments: numbers are rounded to them, and several may add up."""
 
 
@@ -162,7 +162,7 @@ def flatten(
     steps: Mapping[str, float],
     resolve: Resolve | None = None,
     kinematics: Kinematics | None = None,
-    limit: int = LINES,
+    limit: int = MAX_FLAT_LINES,
 ) -> Flat:
     """Write a program out flat; for the arguments see `trace` and `Flattener`.
 
@@ -203,7 +203,7 @@ def difference(before: Moves, after: Moves, steps: Mapping[str, float]) -> str:
     size = np.array([steps[axis] for axis in before.axes])
     size = np.where(before.rotary, np.radians(size), size)
     ends, flat_ends = before.end[rows], after.end[flat]
-    other = (np.abs(ends - flat_ends) > ROUNDINGS * size).any(axis=1)
+    other = (np.abs(ends - flat_ends) > MAX_DEVIATION_INCREMENTS * size).any(axis=1)
     told = (np.isnan(ends) & ~np.isnan(flat_ends)).any(axis=1) & ~np.isin(before.kind[rows], LEADING)
     other |= told | (np.isnan(flat_ends) & ~np.isnan(ends)).any(axis=1)
     stands_in = (before.kind == MotionKind.ARC) & (before.sweep == 0) & (before.rule == Rule.REFUSE)

@@ -22,7 +22,7 @@ from ncfix.values import mutable
 ENDLESS = "NCF233"
 NEVER_ENDS = "the program never ends: it jumps back here again and again, and nothing changes in between"
 WAITS = "the program goes round here until something changes that only the machine knows"
-MOST = 100_000
+MAX_JUMPS_REMEMBERED = 100_000
 """Largest number of backward jumps remembered; the same jump from different calls counts separately."""
 
 TOO_DEEP = "NCF232"
@@ -62,7 +62,7 @@ class Recurrence:
     def seen(self, jump: Hashable, changes: int) -> bool:
         """Record a backward jump; returns whether it was made before and nothing has changed since."""
         before = self.made.get(jump)
-        if len(self.made) >= MOST:
+        if len(self.made) >= MAX_JUMPS_REMEMBERED:
             self.made.clear()
         self.made[jump] = changes
         return before == changes

@@ -31,7 +31,7 @@ Directions = Callable[[float, float], Array]
 PROBES = (0.0, 0.7, 1.3, -0.9)
 """Angles, rad, of one axis at which the line of the other is sought; at some the tool may lie along that line."""
 
-LEAST = 1e-3
+MIN_RELATIVE_RADIUS = 1e-3
 """Smallest radius of the tool's circle about an axis, relative to its length, from which the line can be determined."""
 
 
@@ -56,7 +56,10 @@ class Pointing:
             if outer is None or inner is None:
                 continue
             found = cls((pair[0], pair[1]), (_triple(outer), _triple(inner), _triple(ask(0.0, 0.0))))
-            if all(np.abs(found.at(a, b) - ask(a, b)).max() < SAME for a, b in ((0.4, -1.1), (-2.0, 0.8), (2.9, 2.2))):
+            if all(
+                np.abs(found.at(a, b) - ask(a, b)).max() < EQUALITY_TOLERANCE
+                for a, b in ((0.4, -1.1), (-2.0, 0.8), (2.9, 2.2))
+            ):
                 return found
         return None
 
@@ -88,7 +91,7 @@ class Pointing:
 
     def at_pole(self, direction: Array) -> bool:
         """Whether a tool along the unit vector `direction` (3,) is parallel to the line of the outer axis."""
-        return math.hypot(*cross(self.lines[0], _triple(direction))) < POLE
+        return math.hypot(*cross(self.lines[0], _triple(direction))) < POLE_ANGLE_RAD
 
     def leaves_pole(self, here: Pair, ways: Sequence[Pair]) -> bool:
         """Whether the tool is to leave a pole, where it is parallel to the outer axis: then neither way is nearer."""
@@ -99,7 +102,7 @@ class Pointing:
         middle = self.at((start[0] + stop[0]) / 2, (start[1] + stop[1]) / 2)
         half = self.at(*start) + self.at(*stop)
         size = float(np.linalg.norm(half))
-        return math.pi if size < SAME else float(np.linalg.norm(middle - half / size))
+        return math.pi if size < EQUALITY_TOLERANCE else float(np.linalg.norm(middle - half / size))
 
 
 def _swapped(directions: Directions) -> Directions:
@@ -114,7 +117,7 @@ def _triple(vector: Array) -> Triple:
 def _line(directions: Directions, probes: tuple[float, ...] = PROBES) -> Array | None:
     """The line about which the first axis turns; None if it depends on the angle of the second."""
     lines = [line for probe in probes if (line := _line_at(directions, probe)) is not None]
-    if not lines or any(np.abs(line - lines[0]).max() > SAME for line in lines):
+    if not lines or any(np.abs(line - lines[0]).max() > EQUALITY_TOLERANCE for line in lines):
         return None
     return lines[0]
 
@@ -123,7 +126,7 @@ def _line_at(directions: Directions, second: float) -> Array | None:
     points = [directions(angle, second) for angle in (0.0, math.pi / 2, math.pi)]
     normal = np.cross(points[1] - points[0], points[2] - points[1])
     size = float(np.linalg.norm(normal))
-    return normal / size if size > LEAST**2 else None
+    return normal / size if size > MIN_RELATIVE_RADIUS**2 else None
 
 
 Number = TypeVar("Number", float, Array)
@@ -133,8 +136,9 @@ Vector = tuple[Number, Number, Number]
 Triple = tuple[float, float, float]
 Pair = tuple[float, float]
 
-SAME = 1e-9
-POLE = 1e-7
+EQUALITY_TOLERANCE = 1e-9
+"""Difference of directions and lines (unit vectors, mm) below which they count as equal."""
+POLE_ANGLE_RAD = 1e-7
 """Smallest angle, rad, between tool and outer axis; below it the angle of the outer axis is free."""
 
 
@@ -177,7 +181,7 @@ def solve(
         (_outer_angle(outer, across(outer, turned(inner, angle, tool, apply)), stop, apply), angle)
         for angle in (middle + half, middle - half)
     )
-    return abs(c) - r * (1 + SAME), (first, second)
+    return abs(c) - r * (1 + EQUALITY_TOLERANCE), (first, second)
 
 
 def nearest(ways: tuple[Pair, Pair], near: Pair) -> tuple[Pair, Pair]:
@@ -233,7 +237,11 @@ def _outer_angle(outer: Vector[Number], start: Vector[Number], stop: Vector[Numb
 
 
 def _angle(sine: float, cosine: float, start: float, stop: float) -> float:
-    return math.nan if start < POLE * POLE or stop < POLE * POLE else math.atan2(sine, cosine)
+    return (
+        math.nan
+        if start < POLE_ANGLE_RAD * POLE_ANGLE_RAD or stop < POLE_ANGLE_RAD * POLE_ANGLE_RAD
+        else math.atan2(sine, cosine)
+    )
 
 
 def _arc(cosine: float) -> float:

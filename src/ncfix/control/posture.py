@@ -23,25 +23,25 @@ from ncfix.control.moves import Kinematics, TcpState
 from ncfix.control.pointing import Pair, Pointing, Triple
 from ncfix.values import frozen
 
-PROBE = 128.0
+PROBE_LENGTH_MM = 128.0
 """Tool length, mm, used to find the tool direction; a power of two, so that dividing by it is exact."""
 
-SQUARE = 2e-4
+ALIGNMENT_TOLERANCE_RAD = 2e-4
 """Largest angle, rad, between tool and a direction that it is taken to lie along: rotary words have three decimals of
 a degree, 9e-6 rad each."""
 
-FAR = math.radians(0.1)
+MAX_PLANE_DEVIATION_RAD = math.radians(0.1)
 """Largest deviation, rad, between turning the tool in a plane and turning its rotary axes evenly. A control may do
 either. The tip is not affected; but beyond this, pieces of a motion would orient the tool differently from the
 whole."""
 
-AT_END = 1e-6
+TRAVEL_END_TOLERANCE_RAD = 1e-6
 """Largest overrun of its travel, rad, at which an axis still counts as at its end."""
 
-AT_ZERO = 1e-9
+MIN_SIGNED_RAD = 1e-9
 """Smallest distance from zero, rad, at which an axis has a sign."""
 
-TURNS = 2
+MAX_WHOLE_TURNS = 2
 
 
 class WayRules(NamedTuple):
@@ -89,7 +89,7 @@ class Postures:
     @property
     def strays(self) -> bool:
         """Whether evenly turning axes move the tool out of the plane between the two directions."""
-        return self.pointing.stray(self.here, self.ways[0]) > FAR
+        return self.pointing.stray(self.here, self.ways[0]) > MAX_PLANE_DEVIATION_RAD
 
     def __str__(self) -> str:
         """The angles that the axes take, as programs write them: `B30.000 C120.000`."""
@@ -132,7 +132,7 @@ class MachinePosture:
         def directions(first: float, second: float) -> Array:
             position = [0.0] * len(self.rotary)
             position[turning[0]], position[turning[1]] = first, second
-            return (self._tip(position, 0.0) - self._tip(position, PROBE)) / PROBE
+            return (self._tip(position, 0.0) - self._tip(position, PROBE_LENGTH_MM)) / PROBE_LENGTH_MM
 
         return Pointing.of((self.axis_indices.index(turning[0]), self.axis_indices.index(turning[1])), directions)
 
@@ -151,7 +151,7 @@ class MachinePosture:
             near = (here[0], 0.0) if rules.sense else here
             ways = within(ways, [self.kinematics.travel[column] for column in pointing.columns], near)
         if rules.sign:
-            ways = [way for way in ways if abs(way[1]) < AT_ZERO or (way[1] > 0) == (rules.sign > 0)]
+            ways = [way for way in ways if abs(way[1]) < MIN_SIGNED_RAD or (way[1] > 0) == (rules.sign > 0)]
         if rules.sense and not at_pole:
             ways.sort(key=lambda way: -rules.sense * way[1])
         outer, inner = pointing.columns
@@ -180,9 +180,9 @@ class MachinePosture:
             columns = []
             for index in (X, Y, Z):
                 moved = still[:]
-                moved[index] = PROBE
+                moved[index] = PROBE_LENGTH_MM
                 columns.append(_unit(self._tip(moved, 0.0) - origin))
-            tool = _unit(origin - self._tip(still, PROBE))
+            tool = _unit(origin - self._tip(still, PROBE_LENGTH_MM))
             found = MachineDirections((tool[0], tool[1], tool[2]), as_rotation(list(zip(*columns, strict=True))))
             self._directions = still, found
         return self._directions[1]
@@ -207,8 +207,8 @@ def within(ways: Iterable[Pair], travel: Sequence[Pair], near: Pair) -> list[Pai
 
 def _in_travel(angle: float, low: float, high: float, near: float) -> float | None:
     """The angle, changed by whole turns to be within a travel and nearest to `near`; None if there is none."""
-    turns = (angle + 2 * math.pi * count for count in range(-TURNS, TURNS + 1))
-    possible = [each for each in turns if low - AT_END <= each <= high + AT_END]
+    turns = (angle + 2 * math.pi * count for count in range(-MAX_WHOLE_TURNS, MAX_WHOLE_TURNS + 1))
+    possible = [each for each in turns if low - TRAVEL_END_TOLERANCE_RAD <= each <= high + TRAVEL_END_TOLERANCE_RAD]
     return min(possible, key=lambda each: abs(each - near), default=None)
 
 

@@ -12,7 +12,7 @@ from ncfix.control.coordinates import LETTERS
 from ncfix.control.setup import CALCULATOR, POINTLESS, Setup, Tool
 from ncfix.diagnostics import ConfigError, Place
 from ncfix.files import read_bytes
-from ncfix.inputs import MOST_SAID
+from ncfix.inputs import MAX_CONFIG_BYTES
 from ncfix.toml_text import KeyCodes, Report, TomlTable, decoded, key_lines, parsed
 
 NOT_TOML = "NCF381"
@@ -32,7 +32,7 @@ TOOL = re.compile(r"\d{1,9}$|(?!T\d+$|\d+$).{2,}")
 
 def load(path: str) -> Setup:
     """Read a setup file. Raises SourceError NCF002, or ConfigError NCF38x with everything that is wrong in it."""
-    return loads(decoded(read_bytes(path, MOST_SAID), path, NOT_TOML), path)
+    return loads(decoded(read_bytes(path, MAX_CONFIG_BYTES), path, NOT_TOML), path)
 
 
 def loads(text: str, path: str = "<setup>") -> Setup:

@@ -32,7 +32,7 @@ from ncfix.control.expressions import Unknown, Value
 from ncfix.control.frames import FrameStack, handed, mixed_into
 from ncfix.control.moves import AT_START, Arc, FeedMode, UnknownAxes
 from ncfix.control.pointing import Pair
-from ncfix.control.posture import NEAREST, SQUARE, MachinePosture, Postures, WayRules, normal_of
+from ncfix.control.posture import ALIGNMENT_TOLERANCE_RAD, NEAREST, MachinePosture, Postures, WayRules, normal_of
 from ncfix.control.setup import Run, SetupLookup
 from ncfix.diagnostics import Message, Place
 from ncfix.text.dialect import Dialect
@@ -434,7 +434,7 @@ class ControlState(ABC):
         if self.unknown.keys() & {*self.turning}:
             return None
         found = self.posture.directions(self.position)
-        return None if found is None else math.dist(found.tool, normal_of(frame)) < SQUARE
+        return None if found is None else math.dist(found.tool, normal_of(frame)) < ALIGNMENT_TOLERANCE_RAD
 
     @property
     def plane_axes(self) -> int:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 MACHINE = TcpState(False, 0.0)
 
-ALIKE = 1e-7
+EQUAL_TOLERANCE = 1e-7
 """Largest difference, mm and rad, of positions that are equal except for rounding."""
 
 TURNED = "where the axis {} stands in tool-centre-point coordinates depends on the machine's kinematics"
@@ -62,7 +62,7 @@ def led_in_machine(control: ControlState, axes: Mapping[int, float], unsure: Unk
         turned = {index: TURNED for index in (X, Y, Z) if index in control.axis_indices}
         return MotionEnd(target, unknown | turned | doubts)
     for index in still:
-        if abs(target[index] - control.position[index]) < ALIKE:
+        if abs(target[index] - control.position[index]) < EQUAL_TOLERANCE:
             target[index] = control.position[index]
     known = not (control.unknown or unknown) and in_machine(control) is not None
     return MotionEnd(target, unknown, in_machine=end if known else None)
@@ -120,7 +120,7 @@ def renamed(moves: Moves, row: int, position: Array, kinematics: Kinematics | No
     if before == after or not known:
         return None
     meant = kinematics(moves.end[row - 1].tolist(), before, after)
-    if np.abs(meant - moves.start[row]).max() > ALIKE:
+    if np.abs(meant - moves.start[row]).max() > EQUAL_TOLERANCE:
         return None
     return np.array(kinematics(position.tolist(), before, after))
 
@@ -140,7 +140,7 @@ def passed_through(moves: Moves, row: int, position: Array, kinematics: Kinemati
     start, end, now = (
         np.array(kinematics(each.tolist(), state, MACHINE)) for each in (moves.start[row], moves.end[row], position)
     )
-    moved, said = np.abs(end - start) > ALIKE, np.abs(moves.end[row] - moves.start[row]) > ALIKE
+    moved, said = np.abs(end - start) > EQUAL_TOLERANCE, np.abs(moves.end[row] - moves.start[row]) > EQUAL_TOLERANCE
     if moved.sum() >= said.sum():
         return None
     return np.array(kinematics(np.where(moved, end, now).tolist(), MACHINE, state))

@@ -287,7 +287,7 @@ class Follower:
         return tuple(self.control.knowledge.assumed)
 
 
-FAR = 1e9
+MAX_POSITION = 1e9
 """Largest position, mm or rad: no machine goes beyond it, and doubles of that size no longer resolve micrometres."""
 TOO_FAR = "NCF248"
 
@@ -305,9 +305,9 @@ def check_reach(program: Program, moves: Moves) -> None:
 def _are_far(places: Array) -> Mask:
     """(n,) whether each row of `places` (n, k) is out of reach."""
     rows = np.zeros(len(places), dtype=np.bool_)
-    if not places.size or max(places.max(), -places.min()) <= FAR:
+    if not places.size or max(places.max(), -places.min()) <= MAX_POSITION:
         return rows
-    rows[np.flatnonzero(np.abs(places) > FAR) // places.shape[1]] = True
+    rows[np.flatnonzero(np.abs(places) > MAX_POSITION) // places.shape[1]] = True
     return rows
 
 

@@ -70,9 +70,9 @@ def minutes(moves: Moves, row: int) -> float:
 
 ROLLS = "NCF247"
 HALF_A_TURN = math.pi * (1 - 1e-9)
-BESIDE = math.radians(0.5)
+MAX_CORRECTION_RAD = math.radians(0.5)
 """Limit, rad, that no correction of a rotary axis reaches."""
-BESIDE_ZERO = 1e-9
+ZERO_ANGLE_RAD = 1e-9
 """Largest angle, rad, that counts as zero."""
 
 ROLLED = {
@@ -102,10 +102,10 @@ def half_turns(directed: Mask, start: Array, end: Array) -> tuple[Mask, Mask] | 
     start, end  (n, k) rad, of the axes that may roll over
     """
     way = np.abs(end - start)
-    if not (way >= math.pi - BESIDE).any():
+    if not (way >= math.pi - MAX_CORRECTION_RAD).any():
         return None
     over: Mask = np.any((way >= HALF_A_TURN) & ~directed, axis=1)
-    near: Mask = np.any(np.abs(way - math.pi) < BESIDE, axis=1)
+    near: Mask = np.any(np.abs(way - math.pi) < MAX_CORRECTION_RAD, axis=1)
     return over, near | np.append(near[1:], False)
 
 
@@ -135,7 +135,7 @@ class Winding:
                 continue
             wound = ~there[rows]
             before = np.append(self.wound[axis], wound[:-1])
-            outside = (angle[rows] < -BESIDE_ZERO) | (angle[rows] >= 2 * math.pi - BESIDE_ZERO)
+            outside = (angle[rows] < -ZERO_ANGLE_RAD) | (angle[rows] >= 2 * math.pi - ZERO_ANGLE_RAD)
             found[rows] |= ~wound & before & outside
             self.wound[axis] = wound[-1]
         return found

@@ -20,7 +20,7 @@ from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.machine import Machine
 from ncfix.measure import checks, foreign
 from ncfix.measure.measurement import CENTRE, CHOICES, COMMON, ENDS, KINDS, STATES, Measurement, MeasurementKind
-from ncfix.toml_text import LARGEST, did_you_mean
+from ncfix.toml_text import MAX_NUMBER, did_you_mean
 from ncfix.values import mutable
 
 SHOWN = 25
@@ -358,6 +358,6 @@ def _number(text: MeasurementLines, cell: Cell, name: str) -> float:
         return math.nan
     if not math.isfinite(value):
         text.mark(cell, "NCF608", f"column {name!r}: {cell.text} is not a finite number")
-    elif abs(value) > LARGEST:
+    elif abs(value) > MAX_NUMBER:
         text.mark(cell, "NCF608", f"column {name!r}: {cell.text} is more than anything that is measured")
     return value

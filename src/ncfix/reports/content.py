@@ -24,7 +24,7 @@ from ncfix.reports.document import Line, Paragraph, Part, Plot, ReportSection, T
 
 WAYS = {1: "upwards", -1: "downwards", 0: ""}
 Result = Mapping[str, Any]
-MOST = 500
+MAX_TABLE_ROWS = 500
 """Largest number of rows of a table that are shown."""
 HEADINGS = {
     "verdict": "Diagnosis",
@@ -244,9 +244,9 @@ def _is_rows(value: Any) -> bool:
 
 
 def _limited(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[Part]:
-    yield Table(header, rows[:MOST])
-    if len(rows) > MOST:
-        yield Paragraph(f"And {len(rows) - MOST} more.")
+    yield Table(header, rows[:MAX_TABLE_ROWS])
+    if len(rows) > MAX_TABLE_ROWS:
+        yield Paragraph(f"And {len(rows) - MAX_TABLE_ROWS} more.")
 
 
 def _words(key: str) -> str:

@@ -36,7 +36,7 @@ from ncfix.values import frozen
 HOUR = 3600.0
 CURVES = 4
 """Number of components of an effect that are drawn."""
-LEAST = 1e-99
+MIN_SHOWN_PROBABILITY = 1e-99
 """Smallest probability that is shown as a number."""
 RUNNERS = 6
 """Number of runners-up that are shown."""
@@ -104,7 +104,7 @@ def _chances(diagnosis: Diagnosis) -> Iterator[Part]:
 
 
 def _chance(p: float) -> str:
-    return f"p {'=' if p > LEAST else 'below'} {max(p, LEAST):.1g}"
+    return f"p {'=' if p > MIN_SHOWN_PROBABILITY else 'below'} {max(p, MIN_SHOWN_PROBABILITY):.1g}"
 
 
 def _moved(diagnosis: Diagnosis) -> Iterator[Part]:
@@ -259,7 +259,9 @@ def _where(diagnosis: Diagnosis) -> ReportSection:
         (
             pattern.text,
             f"{pattern.rms_um:.1f}",
-            f"{pattern.p_value:.1g}" if pattern.p_value > LEAST else f"less than {LEAST:g}",
+            f"{pattern.p_value:.1g}"
+            if pattern.p_value > MIN_SHOWN_PROBABILITY
+            else f"less than {MIN_SHOWN_PROBABILITY:g}",
         )
         for pattern in diagnosis.patterns
     ]

@@ -26,7 +26,7 @@ OWN = b'<meta name="generator" content="ncfix '
 """Mark of pages made by ncfix, which a later version may replace."""
 LIBRARY = "plotly.js"
 """File name of the library beside the pages of a batch."""
-WITHIN = 600
+HEAD_BYTES = 600
 """Number of bytes at the beginning of a page within which `OWN` must be found."""
 
 
@@ -83,7 +83,7 @@ def is_own(path: str) -> bool:
     """Whether a file is a page of ncfix, or the library of such pages."""
     try:
         with open(path, "rb") as file:
-            begin = file.read(WITHIN)
+            begin = file.read(HEAD_BYTES)
     except OSError:
         return False
-    return OWN in begin or begin[:WITHIN] == library()[:WITHIN]
+    return OWN in begin or begin[:HEAD_BYTES] == library()[:HEAD_BYTES]

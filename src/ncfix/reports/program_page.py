@@ -24,7 +24,7 @@ from ncfix.version import __version__
 WHOLE = 300_000
 """Largest size, bytes, of a text that a page contains completely; else it has the lines around listed places."""
 AROUND = 2
-LONGEST = 160
+MAX_LINE_CHARACTERS = 160
 """Largest number of characters of a line that are shown."""
 NOTES = 100
 """Largest number of remarks that are shown, the first `FIRST` of them unfolded."""
@@ -196,7 +196,11 @@ class ProgramPage:
         return " ".join(f"{value:.2f}" for value in spot.tip)
 
     def _text(self, line: int) -> str:
-        return self._lines[line - 1].decode("utf-8", "replace")[:LONGEST] if 0 < line <= len(self._lines) else ""
+        return (
+            self._lines[line - 1].decode("utf-8", "replace")[:MAX_LINE_CHARACTERS]
+            if 0 < line <= len(self._lines)
+            else ""
+        )
 
     def _code(self, line: int) -> str:
         return f"<code>{escape(self._text(line))}</code>"

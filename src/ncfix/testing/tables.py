@@ -52,7 +52,7 @@ POSES = 400
 """Number of random poses at which the remaining errors are computed."""
 QUANTA = 1.5
 """Largest rest of a straight error, in steps of the file's values: half a step at two nodes, and their positions."""
-ROUNDED = 1.01
+MAX_RELATIVE_REST = 1.01
 """Largest rest of an error that the tables cannot correct, relative to it; rounding of other entries adds to it."""
 DAMAGED = 12
 """Number of lines of each file that are made unreadable, one at a time."""
@@ -102,7 +102,9 @@ def check_control(control: Control, settings: Mapping[str, str] | None = None, t
         request = _request(machine, chosen, tool_length)
         made = residual(machine, control.read(control.write(request).files), request.space, tool_length, POSES)
         left = _rms(made.after) / _rms(made.before) if made.before.any() else 1.0
-        assert left < ROUNDED, f"{control.name}: {machine.name} is made worse, {left:.3f} of the error is left"
+        assert left < MAX_RELATIVE_REST, (
+            f"{control.name}: {machine.name} is made worse, {left:.3f} of the error is left"
+        )
 
 
 def _check_straight(control: Control, settings: Mapping[str, str], tool_length: float) -> None:

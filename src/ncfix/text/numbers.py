@@ -83,14 +83,14 @@ def is_numeric(text: Bytes) -> Mask:
     return (text - np.uint8(POINT) < ord("9") - POINT + 1) & (text != ord("/"))
 
 
-SHORT = 64
+LEADING_BYTES = 64
 """Leading bytes of spans that are filled for all spans at once; the rest of longer spans is filled one by one."""
 
 
 def fill(cells: NDArray[Any], spans: Ints, value: int) -> None:
     """Set `cells` to `value` over spans (k, 2), most of which are short."""
     starts, stops = spans[:, 0].copy(), spans[:, 1]
-    for _ in range(SHORT):
+    for _ in range(LEADING_BYTES):
         rows = np.flatnonzero(stops > starts)
         if not len(rows):
             return
@@ -131,7 +131,7 @@ def runs_of(mask: Mask) -> Ints:
     return np.flatnonzero(framed[1:] != framed[:-1]).reshape(-1, 2)
 
 
-EIGHT = 8
+WORD_BYTES = 8
 """Bytes converted at once, as one integer; the last bytes of a run are its most significant ones."""
 
 
@@ -153,18 +153,18 @@ def convert(text: Bytes, runs: Ints) -> tuple[Array, Mask]:
 
 def in_lanes(text: Bytes) -> NDArray[np.uint64]:
     """A text as integers of eight bytes each, with sixteen zero bytes before it and some after it."""
-    padded = np.zeros((len(text) // EIGHT + 4) * EIGHT, dtype=np.uint8)
-    padded[2 * EIGHT : 2 * EIGHT + len(text)] = text
+    padded = np.zeros((len(text) // WORD_BYTES + 4) * WORD_BYTES, dtype=np.uint8)
+    padded[2 * WORD_BYTES : 2 * WORD_BYTES + len(text)] = text
     return padded.view("<u8")
 
 
 def digits_of(text: Bytes, starts: Ints, stops: Ints, *, valued: bool = True) -> Digits:
     """The digits of runs (of long runs, of their last sixteen bytes). See `Digits.of`."""
     lanes, lengths = in_lanes(text), stops - starts
-    found = Digits.of(eight_at(lanes, stops + EIGHT), lengths, valued)
-    long = np.flatnonzero(lengths > EIGHT)
+    found = Digits.of(eight_at(lanes, stops + WORD_BYTES), lengths, valued)
+    long = np.flatnonzero(lengths > WORD_BYTES)
     if len(long):
-        found.put_before(long, Digits.of(eight_at(lanes, stops[long]), lengths[long] - EIGHT, valued))
+        found.put_before(long, Digits.of(eight_at(lanes, stops[long]), lengths[long] - WORD_BYTES, valued))
     return found
 
 
@@ -176,18 +176,18 @@ def eight_at(lanes: NDArray[np.uint64], places: Ints) -> NDArray[np.uint64]:
     low >>= over
     lane += 1
     high = lanes.take(lane)
-    high <<= np.subtract(np.uint64(8 * EIGHT), over, out=over)  # by 64 leaves nothing
+    high <<= np.subtract(np.uint64(8 * WORD_BYTES), over, out=over)  # by 64 leaves nothing
     low |= high
     return low
 
 
 def repeated(byte: int) -> np.uint64:
     """Eight equal bytes as one integer."""
-    return np.uint64(int.from_bytes(bytes([byte]) * EIGHT, "little"))
+    return np.uint64(int.from_bytes(bytes([byte]) * WORD_BYTES, "little"))
 
 
 ONES, TOPS, FOURS, POINTS, ZEROS, ABOVE = (repeated(byte) for byte in (0x01, 0x80, 0x0F, POINT, ord("0"), 0x76))
-OWN = np.array([0, *((1 << 64) - (1 << 64 - 8 * count) for count in range(1, EIGHT + 1))], dtype=np.uint64)
+OWN = np.array([0, *((1 << 64) - (1 << 64 - 8 * count) for count in range(1, WORD_BYTES + 1))], dtype=np.uint64)
 """Masks of the `count` most significant bytes of eight, by `count`."""
 MASKS = {8: 0x00FF00FF00FF00FF, 16: 0x0000FFFF0000FFFF, 32: 0x00000000FFFFFFFF}
 """Masks of every second group of `bits` bits."""
@@ -227,7 +227,7 @@ class Digits:
         below = points - np.uint64(1)
         tail = points.astype(np.float64).view(np.int64)
         tail >>= 52
-        np.subtract(1023 + 8 * EIGHT + 7, tail, out=tail)
+        np.subtract(1023 + 8 * WORD_BYTES + 7, tail, out=tail)
         tail >>= 3
         pointed = points != 0
         tail *= pointed
@@ -241,8 +241,8 @@ class Digits:
         again = front.pointed & self.pointed[rows]
         first = front.pointed & ~again
         self.value[rows] *= np.where(first, 10, 1)
-        self.value[rows] += front.value * 10**EIGHT
-        self.tail[rows] += np.where(first, front.tail + EIGHT, 0)
+        self.value[rows] += front.value * 10**WORD_BYTES
+        self.tail[rows] += np.where(first, front.tail + WORD_BYTES, 0)
         self.several[rows] |= front.several | again
         self.pointed[rows] |= front.pointed
         self.pure[rows] &= front.pure

@@ -28,7 +28,7 @@ from ncfix.text.tree import END, START, Anchor, Opaque, Program, Span, Template
 from ncfix.text.writer import line_end
 from ncfix.values import mutable
 
-CAPACITY = 5_000
+MAX_CACHED = 5_000
 """Number of shapes and of texts of a dialect that are cached; the least recently used is dropped first."""
 
 Value = TypeVar("Value")
@@ -52,7 +52,7 @@ class Memory(Generic[Value]):
     def keep(self, key: bytes, value: Value) -> None:
         """Store a value."""
         self._values[key] = value
-        if len(self._values) > CAPACITY:
+        if len(self._values) > MAX_CACHED:
             self._values.popitem(last=False)
 
 

@@ -19,7 +19,6 @@ from ncfix.arrays import Array, Bytes, Ints, Mask
 from ncfix.text.numbers import (
     BLANK,
     BLANKS,
-    EIGHT,
     EXACT_DIGITS,
     NUMERIC,
     OWN,
@@ -27,6 +26,7 @@ from ncfix.text.numbers import (
     POWERS,
     SIGN,
     UNSIGNED_AFTER,
+    WORD_BYTES,
     Numbers,
     eight_at,
     fill,
@@ -327,7 +327,7 @@ def shape_keys(
     return marked.tobytes().translate(None, b"\0")
 
 
-LONG = 8 * EIGHT
+MAX_KEY_BYTES = 8 * WORD_BYTES
 """Largest length of keys that are compared with others."""
 KINDS = 16
 """Number of different keys that are searched for among all others; further ones are assumed to be rare."""
@@ -338,15 +338,17 @@ def distinct(keys: bytes) -> tuple[list[bytes | None], Ints]:
 
     In `keys` each is followed by a line feed. They are compared eight characters at a time, from the end.
     """
-    padded = np.zeros((len(keys) + LONG) // EIGHT * EIGHT + 2 * EIGHT, dtype=np.uint8)
-    padded[LONG : LONG + len(keys)] = np.frombuffer(keys, dtype=np.uint8)
-    stops = np.flatnonzero(padded == ord("\n")) - LONG
+    padded = np.zeros((len(keys) + MAX_KEY_BYTES) // WORD_BYTES * WORD_BYTES + 2 * WORD_BYTES, dtype=np.uint8)
+    padded[MAX_KEY_BYTES : MAX_KEY_BYTES + len(keys)] = np.frombuffer(keys, dtype=np.uint8)
+    stops = np.flatnonzero(padded == ord("\n")) - MAX_KEY_BYTES
     starts = np.append(0, stops[:-1] + 1)
     lengths, lanes = stops - starts, padded.view("<u8")
-    compared = range(0, min(int(lengths.max(initial=0)), LONG), EIGHT)
-    words = [eight_at(lanes, stops + LONG - EIGHT - k) & OWN.take(lengths - k, mode="clip") for k in compared]
+    compared = range(0, min(int(lengths.max(initial=0)), MAX_KEY_BYTES), WORD_BYTES)
+    words = [
+        eight_at(lanes, stops + MAX_KEY_BYTES - WORD_BYTES - k) & OWN.take(lengths - k, mode="clip") for k in compared
+    ]
     group, rows = np.full(len(stops), -1, dtype=np.int64), list[int]()
-    left = np.flatnonzero(lengths <= LONG)
+    left = np.flatnonzero(lengths <= MAX_KEY_BYTES)
     while len(left) and len(rows) < KINDS:
         same = reduce(np.logical_and, (word.take(left) == word[left[0]] for word in words), np.ones(len(left), bool))
         group[left.compress(same)] = len(rows)

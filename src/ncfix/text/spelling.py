@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ncfix import core
 from ncfix.arrays import Array, Bytes, Ints, Mask
-from ncfix.text.numbers import EIGHT, POINT, POWERS, SIGN, digits_of
+from ncfix.text.numbers import POINT, POWERS, SIGN, WORD_BYTES, digits_of
 from ncfix.values import frozen
 
 if TYPE_CHECKING:
@@ -140,14 +140,14 @@ class Spelling:
 
 MOST_DECIMALS = 9
 """Largest number of decimals written in bulk; a number with more is written by itself."""
-LONGEST = 2 * EIGHT
+MAX_BULK_BYTES = 2 * WORD_BYTES
 """Largest number of bytes, without the sign, of a number that is rewritten in bulk."""
-LARGEST = 1e9
+MAX_BULK_STEPS = 1e9
 """Output steps from which on values are written by themselves: their products with powers of ten are too inexact."""
-TIE = 1e-14
+TIE_TOLERANCE = 1e-14
 """Relative distance from the middle between two outputs within which a value counts as on it; a hundred times the
 rounding error of a product of doubles."""
-ROUNDED = 1.01
+MAX_ROUNDING_HALF_STEPS = 1.01
 """Largest distance from its position, in half output steps, by which rounding alone can displace an axis."""
 
 ZERO, MINUS, PLUS = ord("0"), ord("-"), ord("+")
@@ -155,7 +155,9 @@ ZERO, MINUS, PLUS = ord("0"), ord("-"), ord("+")
 
 def rules() -> NumberRules:
     """These limits, in the form that the core takes."""
-    return core.loops("words").NumberRules(POWERS, LONGEST, MOST_DECIMALS, LARGEST, TIE, ROUNDED)
+    return core.loops("words").NumberRules(
+        POWERS, MAX_BULK_BYTES, MOST_DECIMALS, MAX_BULK_STEPS, TIE_TOLERANCE, MAX_ROUNDING_HALF_STEPS
+    )
 
 
 @frozen
@@ -190,7 +192,7 @@ def styles_of(text: Bytes, spans: Ints, *, signed: bool = False) -> Styles:
         plus=(signs == PLUS) | (signs == MINUS) if signed else signs == PLUS,
         leading_zero=whole > 0,
         width=np.where((whole > 1) & (text.take(first) == ZERO), whole, 0),
-        clear=found.pure & ~found.several & (stops - first <= LONGEST) & (decimals <= MOST_DECIMALS),
+        clear=found.pure & ~found.several & (stops - first <= MAX_BULK_BYTES) & (decimals <= MOST_DECIMALS),
     )
 
 
@@ -232,7 +234,7 @@ def is_plain(values: Array, decimals: Ints) -> Mask:
     with np.errstate(invalid="ignore"):
         steps = np.abs(values) * POWERS.take(decimals)
         off = np.abs(steps - np.floor(steps) - 0.5)
-        plain: Mask = (steps < LARGEST) & (off > TIE * steps)
+        plain: Mask = (steps < MAX_BULK_STEPS) & (off > TIE_TOLERANCE * steps)
     return plain
 
 
@@ -272,7 +274,7 @@ def plain(values: Array, decimals: Ints, heads: Bytes, *, signed: bool = False) 
 
 
 def _steps(values: Array, decimals: Ints) -> NDArray[np.uint32]:
-    """The absolute values in output steps; all less than `LARGEST`."""
+    """The absolute values in output steps; all less than `MAX_BULK_STEPS`."""
     return np.rint(np.abs(values) * POWERS.take(decimals)).astype(np.uint32)
 
 

@@ -13,7 +13,7 @@ from ncfix.text.writer import Edit
 #: The beginning of every stamp; the rest is for people.
 SIGN = re.compile(r"\bncfix \d+\.\d+\S* machine ", re.IGNORECASE)
 
-MANY = 100
+MANY_COMMENTS = 100
 """Number of comments above which searching the whole text is faster than examining each comment."""
 
 
@@ -21,7 +21,7 @@ def find(program: Program) -> int | None:
     """The block with the stamp; None without one."""
     carriers = [any(isinstance(item, (Comment, Opaque)) for item in each.items) for each in program.templates]
     blocks = np.flatnonzero(np.array(carriers)[program.template])
-    if len(blocks) > MANY and b"ncfix" not in program.source.lower():
+    if len(blocks) > MANY_COMMENTS and b"ncfix" not in program.source.lower():
         return None
     for block in blocks.tolist():
         for item in program.items_of(block):

@@ -23,15 +23,15 @@ from ncfix.writer.target import LINE, TANGENTIAL, Rendered, Target, feed_number,
 
 FEED_DECIMALS = 3
 """F words of the pieces of a block in G93 have at least this many decimals."""
-GRAIN = 1e-6
+WHOLE_STEP_TOLERANCE = 1e-6
 """Tolerance, in output steps, within which a number counts as a whole number of output steps."""
 
 STRAIGHT_AND_ARCS = (0, 10, 20, 30)
 """Motion codes, in tenths, that may be restated: G0 to G3."""
 
-CLOSED, EXACT = 1e-6, 1e-9
-"""Program units: an arc with ends nearer than `CLOSED` is a full circle; positions nearer than `EXACT` are equal."""
-NEAR = 2.0
+MAX_CLOSED_GAP, EQUALITY_TOLERANCE = 1e-6, 1e-9
+"""Program units: ends of full circles are nearer than the first; positions nearer than the second are equal."""
+FULL_CIRCLE_STEPS = 2.0
 """Distance of start and end, in steps of the control: full circles have less than this, other arcs more."""
 
 INVERSE_TIME, PER_MINUTE = "93", "94"
@@ -216,8 +216,10 @@ class BlockWriter(BlockText):
         if not target.arc or len(target.ends) > 1:
             return closed
         plane, nominal = [target.spatial[index] for index in target.plane[:2]], self._xyz(target.nominal)
-        if -1 not in plane and all(abs(nominal[index] - target.origin[index]) < CLOSED for index in target.plane[:2]):
-            closed[plane] = np.linalg.norm(((end - position) / target.resolved)[plane]) < NEAR
+        if -1 not in plane and all(
+            abs(nominal[index] - target.origin[index]) < MAX_CLOSED_GAP for index in target.plane[:2]
+        ):
+            closed[plane] = np.linalg.norm(((end - position) / target.resolved)[plane]) < FULL_CIRCLE_STEPS
         return closed
 
     def _stay(self, position: Array, column: int, word: Word | None) -> None:
@@ -226,7 +228,7 @@ class BlockWriter(BlockText):
             return
         start = float(position[column])
         self._present_axis(position, column, start, word)
-        if abs(position[column] - start) > EXACT:
+        if abs(position[column] - start) > EQUALITY_TOLERANCE:
             self._take_back(word.span)
             self._remove(word)
             position[column] = start
@@ -241,9 +243,9 @@ class BlockWriter(BlockText):
         word = self.layout.levels.get(level.address)
         decimals, half, wanted = int(self.target.decimals[level.across]), self.half[level.across], level.wanted
         if wanted < level.least:
-            wanted = float(np.ceil(level.least / (2 * half) - GRAIN) * 2 * half)
+            wanted = float(np.ceil(level.least / (2 * half) - WHOLE_STEP_TOLERANCE) * 2 * half)
         self.out.level = level.before if word is None else self._value(word, level.nominal)
-        if abs(wanted - self.out.level) < half and not self.out.level < level.least - 2 * GRAIN * half:
+        if abs(wanted - self.out.level) < half and not self.out.level < level.least - 2 * WHOLE_STEP_TOLERANCE * half:
             return
         if word is None:
             self.out.level = self._add(level.address, wanted, decimals)

@@ -26,7 +26,7 @@ CIRCLE_MM = 1e-3
 """Smallest distance of start and end of an arc written in bulk, mm: below it `BlockWriter` decides on a full circle."""
 SEMICIRCLE = 1e-6
 """Smallest difference, program units, between radius and half chord: below it the radius does not define the centre."""
-TIE = 1e-4
+TIE_MARGIN_HALF_STEPS = 1e-4
 """Margin, in half output steps, around the allowed distance of centres within which `BlockWriter` decides."""
 
 
@@ -146,7 +146,7 @@ class CentreWords:
         clear.ravel()[anew] &= styles.clear
         point[each, plane] = np.where(says[:, None], meant, base + np.where(changes, rounded(wanted, digits), original))
         sure = ~(np.abs(by_radius - np.hypot(*(end - start).T) / 2) < SEMICIRCLE)
-        sure &= ~(np.abs(off - 2 * half[:, 0]) < TIE * half[:, 0])
+        sure &= ~(np.abs(off - 2 * half[:, 0]) < TIE_MARGIN_HALF_STEPS * half[:, 0])
         return cls(
             block,
             plane,

@@ -104,7 +104,7 @@ class SecondReading:
 
 PINNED = "a refused arc that follows starts from its end"
 BEYOND_TRAVEL = "a refused increment that follows would leave the travel"
-STILL = 1e-9
+UNIT_NORMAL_TOLERANCE = 1e-9
 """Distance from 1 within which a component of a unit normal counts as 1."""
 
 
@@ -154,7 +154,7 @@ class _Walk:
         """Which arcs (k,) have both end and centre relative to their start; full circles are among them."""
         moves = self.moves
         named = [self.absolute[arcs, column] for column in self.columns if column >= 0]
-        in_plane = np.abs(moves.normal[arcs]) < 1 - STILL
+        in_plane = np.abs(moves.normal[arcs]) < 1 - UNIT_NORMAL_TOLERANCE
         own = np.stack(named, axis=1) & in_plane[:, [k for k, column in enumerate(self.columns) if column >= 0]]
         return np.asarray(~moves.about_fixed_point[arcs] & ~own.any(axis=1))
 
@@ -186,7 +186,7 @@ class _Walk:
             return np.asarray(self.moves.programmed[row].copy())
         axes = np.zeros(len(self.moves.axes), dtype=bool)
         for column, across in zip(self.columns, np.abs(self.moves.normal[row]).tolist(), strict=True):
-            if column >= 0 and across < 1 - STILL:
+            if column >= 0 and across < 1 - UNIT_NORMAL_TOLERANCE:
                 axes[column] = True
         return axes
 
@@ -199,7 +199,7 @@ class _Walk:
         turned = [
             column
             for column, own in zip(self.columns, moves.frames[moves.frame[row]].rotation, strict=True)
-            if column >= 0 and np.abs(own).max() < 1 - STILL
+            if column >= 0 and np.abs(own).max() < 1 - UNIT_NORMAL_TOLERANCE
         ]
         if turned and not decided[turned].all():
             decided[turned] = False

@@ -73,12 +73,12 @@ OTHERS = (
 @contextmanager
 def stretches_of(shortest: int) -> Iterator[None]:
     """Which stretches go through the fast lane; `COMPILED`: all of them, compiled if that is installed."""
-    before, lane.SHORTEST = lane.SHORTEST, abs(shortest)
+    before, lane.MIN_STRETCH_BLOCKS = lane.MIN_STRETCH_BLOCKS, abs(shortest)
     core.use(None if shortest == COMPILED else "plain")
     try:
         yield
     finally:
-        lane.SHORTEST = before
+        lane.MIN_STRETCH_BLOCKS = before
         core.use(None)
 
 

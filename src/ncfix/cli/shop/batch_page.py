@@ -29,7 +29,7 @@ HEADER = (
 )
 FIGURES = (2, 3, 4, 5, 6)
 """Indices of columns with numbers."""
-MOST = 20
+MAX_REMARKS_SHOWN = 20
 """Largest number of reasons and remarks shown for a program; all are counted."""
 
 
@@ -127,5 +127,8 @@ def _said(wrong: Sequence[tuple[str, str]], remarks: Sequence[tuple[str, str]]) 
         return first
     codes = Counter(code for code, _ in (*wrong[1:], *remarks))
     counted = ", ".join(f"{code} ({count})" if count > 1 else code for code, count in codes.items())
-    rest = [*rest[:MOST], *([f"and {len(rest) - MOST} more"] if len(rest) > MOST else [])]
+    rest = [
+        *rest[:MAX_REMARKS_SHOWN],
+        *([f"and {len(rest) - MAX_REMARKS_SHOWN} more"] if len(rest) > MAX_REMARKS_SHOWN else []),
+    ]
     return f"{first}<details><summary>{escape(counted)}</summary>{'<br>'.join(rest)}</details>"

@@ -154,8 +154,8 @@ def progress(total: int) -> Iterator[Advance]:
 class OutcomeReporter:
     """Prints the messages of finished programs.
 
-    many  whether there are many programs: then each one that was not written gets one line, at most `console.MOST`
-          lines for each reason; with tracebacks enabled, all messages of such a program are printed
+    many  whether there are many programs: then each one that was not written gets one line, for each reason at most
+          `console.MAX_MESSAGES_PER_CODE` lines; with tracebacks enabled, all messages of such a program are printed
     """
 
     verbosity: Verbosity
@@ -172,7 +172,7 @@ class OutcomeReporter:
         elif self.many and wrong:
             code = wrong[0][0]
             self.seen[code] += 1
-            if self.seen[code] <= console.MOST:
+            if self.seen[code] <= console.MAX_MESSAGES_PER_CODE:
                 console.say(brief(entry))
-            elif self.seen[code] == console.MOST + 1:
+            elif self.seen[code] == console.MAX_MESSAGES_PER_CODE + 1:
                 console.say(f"more programs with {code} are only counted; -v and --json name all")

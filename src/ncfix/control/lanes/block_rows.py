@@ -23,7 +23,7 @@ Shapes = NDArray[np.int32]
 Before = tuple[float, float, float]
 """mm per unit of an F word (1 under inverse time feed); the feed and the motion code in force before the blocks."""
 
-LONGEST = 1 << 16
+MAX_BLOCKS_AT_ONCE = 1 << 16
 """Largest number of blocks evaluated at once."""
 
 
@@ -205,7 +205,7 @@ def filled(values: Array, valid: Mask, before: float) -> Array:
     return np.where(last >= 0, values[last], before)
 
 
-FEWEST = 256
+MIN_OFFERED_BLOCKS = 256
 """Smallest number of blocks offered after a rejection; evaluating so few takes negligible time."""
 
 
@@ -231,8 +231,8 @@ class Lookahead:
     stage: BlockRows | None = None
     frame: object = None
     done: int = 0
-    reach: int = field(default=LONGEST)
-    most: int = field(default=LONGEST)
+    reach: int = field(default=MAX_BLOCKS_AT_ONCE)
+    most: int = field(default=MAX_BLOCKS_AT_ONCE)
 
     def stretch(self, control: ProgramControl, unit: ProgramText, block: int, stop: int) -> BlockRows:
         """The blocks from `block` to before `stop`, from the present state. The caller then sets `done`."""
@@ -252,14 +252,14 @@ class Lookahead:
 
         All blocks offered are searched for the one that interrupts them, which would be wasted time.
         """
-        self.most = min(2 * self.most, LONGEST) if taken == offered else max(2 * taken, FEWEST)
+        self.most = min(2 * self.most, MAX_BLOCKS_AT_ONCE) if taken == offered else max(2 * taken, MIN_OFFERED_BLOCKS)
 
     def _looked(self, control: ProgramControl, unit: ProgramText, block: int, stop: int) -> BlockRows:
         """Evaluate up to twice as many blocks as were used of the last evaluation, and at least those to `stop`."""
         if control.modal.incremental:
             return stage_of(control, unit, block, stop)
         if self.stage is not None:
-            self.reach = min(max(stop - block, 2 * (self.done - self.begin)), LONGEST)
+            self.reach = min(max(stop - block, 2 * (self.done - self.begin)), MAX_BLOCKS_AT_ONCE)
         return stage_of(control, unit, block, min(max(stop, block + self.reach), len(unit.program)))
 
 

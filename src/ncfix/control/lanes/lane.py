@@ -17,7 +17,7 @@ import numpy as np
 
 from ncfix import core
 from ncfix.arrays import Array, Ints, Mask
-from ncfix.control.arcs import CLOCKWISE, COUNTER, FUZZ, ZERO_RADIUS, centre_from_radius, check_closure
+from ncfix.control.arcs import CLOCKWISE, COUNTER, MIN_RADIUS_MM, MIN_SWEEP_RAD, centre_from_radius, check_closure
 from ncfix.control.builder import Circles, MotionColumns
 from ncfix.control.control import ProgramControl
 from ncfix.control.coordinates import IDENTITY, X, mask_of
@@ -25,7 +25,7 @@ from ncfix.control.expressions import Fault
 from ncfix.control.lanes.block_rows import BlockRows, Lane, LaneTables, Lookahead, ProgramText, rows_before, words
 from ncfix.control.moves import FeedMode, MotionKind
 
-SHORTEST = 16
+MIN_STRETCH_BLOCKS = 16
 """Smallest number of blocks in a stretch; shorter stretches are executed block by block."""
 ARCS = (CLOCKWISE, COUNTER)
 
@@ -68,16 +68,16 @@ def run_lane(
     turned  for languages that have arcs in the fast lane: finds the circles of the stage that begins with `block`
     """
     stop = min(unit.lane_end(block), block + unit.ahead.most)
-    if stop - block < SHORTEST or not is_open(control, unit, block):
+    if stop - block < MIN_STRETCH_BLOCKS or not is_open(control, unit, block):
         return 0
     stage = unit.ahead.stretch(control, unit, block, stop)
     count, circles = min(before_placing(control, stage.mask, 0), count_allowed(control, stage)), None
     if control.turns_in_plane and (turning := stage.mask[:count] & mask_of(control.turning)).any():
         count = int(np.argmax(turning != 0))
-    if turned is not None and stage.turns is not None and count >= SHORTEST:
+    if turned is not None and stage.turns is not None and count >= MIN_STRETCH_BLOCKS:
         circles, count = turned(block, stage.rows(0, count))
     unit.ahead.note(count, stop - block)
-    if count < SHORTEST:
+    if count < MIN_STRETCH_BLOCKS:
         return 0
     unit.ahead.done = block + count
     take(control, stage.rows(0, count), block, main, circles)
@@ -205,7 +205,7 @@ def turned(control: ProgramControl, unit: ProgramText, block: int, stage: BlockR
             break
     local, sweep = np.zeros((len(rows), 3)), np.empty(len(rows))
     local[:, columns] = centre[: len(rows)]
-    core.loops("motions").sweeps(centre, np.ascontiguousarray(step), clockwise.view(np.uint8), FUZZ, sweep)
+    core.loops("motions").sweeps(centre, np.ascontiguousarray(step), clockwise.view(np.uint8), MIN_SWEEP_RAD, sweep)
     fixed = np.logical_or(*unit.lanes.fixed[unit.program.template[block + rows]][:, columns].T)
     middle = begin[: len(rows), :3] + local
     return Circles(rows, middle, IDENTITY[plane.across], control.handedness * sweep, fixed), count
@@ -214,7 +214,7 @@ def turned(control: ProgramControl, unit: ProgramText, block: int, stage: BlockR
 def closes(control: ProgramControl, step: Array, centre: Array) -> Mask:
     """(k,) arcs whose radii at start and end (`step` from the start) surely agree; `on_circle` decides on others."""
     start, end = np.hypot(*centre.T), np.hypot(*(step - centre).T)
-    return (np.minimum(start, end) > 2 * ZERO_RADIUS) & (np.abs(start - end) < control.closure_mm / 2)
+    return (np.minimum(start, end) > 2 * MIN_RADIUS_MM) & (np.abs(start - end) < control.closure_mm / 2)
 
 
 def on_circle(

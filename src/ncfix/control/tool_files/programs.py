@@ -30,7 +30,7 @@ ASSIGNED = re.compile(
 UNIT = re.compile(r"CHANDATA\s*\(\s*(\d+)\s*\)", re.IGNORECASE)
 LENGTHS, RADII = (3, 12, 21), (6, 15)
 """Numbers of $TC_DP for length 1 (geometry, wear, base) and for the radius (geometry, wear)."""
-ASIDE = {"X": (5, 14, 23), "Y": (4, 13, 22)}
+CROSS_LENGTHS = {"X": (5, 14, 23), "Y": (4, 13, 22)}
 """Axis -> numbers of $TC_DP for the length along it (lengths 3 and 2, with the plane G17)."""
 TURNING = range(500, 600)
 """Numbers of the types of turning tools ($TC_DP1)."""
@@ -79,7 +79,9 @@ def tool_data_rows(text: str, scale: float) -> Iterator[Row]:
         if int(values.get(1, 0)) in TURNING or taken.count(name) > 1:
             continue
         length, radius = (sum(values.get(each, 0.0) for each in several) * scale for several in (LENGTHS, RADII))
-        sizes = {letter: sum(values.get(each, 0.0) for each in several) * scale for letter, several in ASIDE.items()}
+        sizes = {
+            letter: sum(values.get(each, 0.0) for each in several) * scale for letter, several in CROSS_LENGTHS.items()
+        }
         aside = " ".join(f"{letter}{size:g}" for letter, size in sizes.items() if size)
         key: int | str = int(name) if name.isdecimal() and edge == 1 else name if edge == 1 else f"{name} D{edge}"
         yield lines[tool], (key, Tool(None if aside else length, radius, aside))

@@ -25,17 +25,17 @@ from ncfix.control.setup import Tool
 from ncfix.control.tool_files.programs import Row, is_offsets, is_tool_data, offset_rows, tool_data_rows
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.files import read_bytes
-from ncfix.inputs import MOST_SAID
+from ncfix.inputs import MAX_CONFIG_BYTES
 
 BAD_TABLE = "NCF385"
 ENTRY = re.compile(r"([TPXYZABCUVWDIJQ])\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+)?)(?![\d.E])", re.IGNORECASE)
 """A word of LinuxCNC's tool table."""
-ASIDE = "XYABCUVW"
+OTHER_AXES = "XYABCUVW"
 """Axes other than Z: the length of a tool with an offset along one of them is taken as unknown."""
-SHORT = 15.0
+SHORTEST_TOOL_MM = 15.0
 """Length, mm, that at least one tool of a table in mm exceeds; a tool with its holder is never so short."""
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)\Z")
-LONGEST = 1e6
+MAX_LENGTH_MM = 1e6
 """Largest plausible length or radius, mm; a larger number is a typing error."""
 COLUMNS = ("tool", "length", "radius", "diameter")
 WORDS = ("name", "description", "comment", "note")
@@ -44,7 +44,7 @@ UNITS = {"mm": 1.0, "inch": INCH}
 OTHERWISE = "docs/formats.md lists the tables that are read; any other one as CSV with columns tool, length"
 
 
-def load_tool_table(path: str, axes: Collection[str] = ASIDE, unit: str = "mm") -> dict[int | str, Tool]:
+def load_tool_table(path: str, axes: Collection[str] = OTHER_AXES, unit: str = "mm") -> dict[int | str, Tool]:
     """The tools in a control's table, by number or by name, as the table calls them. The text shows the format.
 
     axes  axes of the machine: offsets along others have no effect
@@ -52,7 +52,7 @@ def load_tool_table(path: str, axes: Collection[str] = ASIDE, unit: str = "mm") 
 
     Raises SourceError NCF002, and ConfigError NCF385 with every wrong line.
     """
-    source = read_bytes(path, MOST_SAID)
+    source = read_bytes(path, MAX_CONFIG_BYTES)
     text, (what, hint) = plain_text(source), other_form(source)
     if text is None or what:
         raise ConfigError.of(BAD_TABLE, f"{what or 'not plain text'}, not a tool table", Place(path), hint or OTHERWISE)
@@ -63,8 +63,8 @@ def load_tool_table(path: str, axes: Collection[str] = ASIDE, unit: str = "mm") 
         if isinstance(content, str):
             row = rows[line - 1] if 0 < line <= len(rows) else ""
             faults.append(Message(BAD_TABLE, content, Place(path, line, 0, row)))
-        elif max(abs(content[1].length or 0.0), abs(content[1].radius or 0.0)) > LONGEST:
-            faults.append(Message(BAD_TABLE, f"no tool is longer than {LONGEST:g} mm", Place(path, line)))
+        elif max(abs(content[1].length or 0.0), abs(content[1].radius or 0.0)) > MAX_LENGTH_MM:
+            faults.append(Message(BAD_TABLE, f"no tool is longer than {MAX_LENGTH_MM:g} mm", Place(path, line)))
         elif content[0] in tools:
             faults.append(Message(BAD_TABLE, f"tool {content[0]} stands twice", Place(path, line)))
         else:
@@ -92,7 +92,7 @@ def _rows(text: str, path: str, axes: Collection[str], scale: float) -> Iterator
 def may_be_in_inches(tools: Mapping[int | str, Tool]) -> str:
     """A question to the user if all tools are too short for a table in mm; otherwise ""."""
     lengths = [tool.length for tool in tools.values() if tool.length is not None and tool.length > 0]
-    if len(lengths) < 2 or max(lengths) > SHORT:
+    if len(lengths) < 2 or max(lengths) > SHORTEST_TOOL_MM:
         return ""
     return f"no tool is longer than {max(lengths):g} mm: is the table in inches?"
 
@@ -107,7 +107,7 @@ def linuxcnc_rows(text: str, axes: Collection[str], scale: float) -> Iterator[Ro
             continue
         rest, words = ENTRY.sub("", entry).strip(), ENTRY.findall(entry.upper())
         values = {letter: float(number) for letter, number in words}
-        aside = [f"{letter}{values[letter]:g}" for letter in ASIDE if letter in axes and values.get(letter)]
+        aside = [f"{letter}{values[letter]:g}" for letter in OTHER_AXES if letter in axes and values.get(letter)]
         if rest:
             yield line, f"{rest!r} is not understood in a tool table"
         elif len(values) < len(words):
