@@ -172,7 +172,7 @@ def in_stretches(lines: Ints) -> tuple[tuple[int, int], ...]:
 
 
 def stops(flags: Mask) -> Ints:
-    """(n + 1,) for each of some things (n,), and behind the last one, the first from there on whose flag is not set."""
+    """(n + 1,) for each index from 0 to n, the first index from there on whose flag (n,) is not set; n if none is."""
     ends = np.append(np.flatnonzero(~flags), len(flags))
     return np.repeat(ends, np.diff(ends, prepend=-1))
 

@@ -284,7 +284,7 @@ def _folder(path: str, root: str | None) -> Iterator[tuple[int, str]]:
 
 
 def _as_it_is(name: str, folder: int) -> os.stat_result | None:
-    """Status of a file in a folder; None if there is none."""
+    """Status of a file in a folder; None if the file does not exist."""
     try:
         return os.stat(name, dir_fd=folder, follow_symlinks=False)
     except FileNotFoundError:

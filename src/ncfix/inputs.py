@@ -88,7 +88,7 @@ FileIdentity = tuple[int, int]
 
 
 def identity(path: str) -> FileIdentity | None:
-    """The identity of the file with a name; None if there is none."""
+    """The identity of the file with a name; None if the file does not exist."""
     try:
         found = os.stat(path)
     except (OSError, ValueError):

@@ -49,12 +49,12 @@ def diameter(control: RS274Control, block: Block, code: int) -> None:
 
 
 def distance(control: RS274Control, block: Block, code: int) -> None:
-    """G90 and G91."""
+    """G90 and G91: axis words are absolute or incremental."""
     control.modal.incremental = code == 910
 
 
 def arc_distance(control: RS274Control, block: Block, code: int) -> None:
-    """G90.1 and G91.1."""
+    """G90.1 and G91.1: centres of arcs are absolute or relative to the start."""
     control.modal.arc_absolute = code == 901
 
 

@@ -27,7 +27,7 @@ State = tuple[int, int, int]
 
 
 def state_of(path: str) -> State | None:
-    """The state of a file; None if there is none."""
+    """The state of a file; None if the file does not exist."""
     try:
         found = os.stat(path)
     except OSError:

@@ -1,4 +1,4 @@
-"""Verbs that list what there is: `ncfix dialects`, `ncfix plugins`, `ncfix explain CODE`, `ncfix completion SHELL`."""
+"""Verbs that list and explain: `ncfix dialects`, `ncfix plugins`, `ncfix explain CODE`, `ncfix completion SHELL`."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ class Positive(click.ParamType):  # type: ignore[type-arg]
         self.least = least
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The number."""
+        """Convert the text to a finite number above zero, or fail with a usage error."""
         try:
             found = float(value)
         except ValueError:
@@ -124,10 +124,10 @@ class Positive(click.ParamType):  # type: ignore[type-arg]
 
 
 class FiniteRange(click.FloatRange):
-    """A number within limits; "nan", which is neither below nor above them, is none."""
+    """A finite number within limits; "nan" is refused, although it is neither below nor above them."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The number."""
+        """Convert the text to a finite number within the limits, or fail with a usage error."""
         found = float(super().convert(value, param, ctx))
         if not math.isfinite(found):
             self.fail(f"{value!r} is not a number", param, ctx)
@@ -148,7 +148,7 @@ class ToolLength(click.ParamType):  # type: ignore[type-arg]
     name = "mm"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The number."""
+        """Convert the text to a length, mm, or fail with a usage error."""
         try:
             found = float(value)
         except ValueError:

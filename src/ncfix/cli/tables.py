@@ -272,7 +272,7 @@ def lint(paths: tuple[str, ...], control: str, as_json: bool) -> int:
 
 
 def _gathered(paths: Sequence[str]) -> Iterator[tuple[str, dict[str, bytes]]]:
-    """Folder -> the files meant in it; raises `SourceError` NCF002."""
+    """Each folder with the files to read from it; raises `SourceError` NCF002."""
     found: dict[str, dict[str, bytes]] = {}
     for path in paths:
         if os.path.isdir(path):

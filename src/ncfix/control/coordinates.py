@@ -47,12 +47,12 @@ class Plane:
 
     @property
     def axes(self) -> int:
-        """Its two axes as a bit mask."""
+        """The two axes of the plane as a bit mask."""
         return 1 << self.first | 1 << self.second
 
     @property
     def pair(self) -> tuple[int, int]:
-        """Its two axes, in their order."""
+        """The two axes of the plane in right-handed order, as letter indices."""
         return self.first, self.second
 
     def of(self, values: Sequence[T]) -> tuple[T, T]:

@@ -103,7 +103,7 @@ class Expressions:
     impossible = "the result of {} is not a finite number"
 
     def compiled(self, expression: Expression, address: str = "") -> Evaluate:
-        """The function that computes an expression; `address`: the address it stands behind, if any."""
+        """The function that computes an expression; `address`: the address that it follows, if any."""
         match expression:
             case Literal(slot):
                 return lambda scope: scope.numbers[scope.first + slot]

@@ -73,11 +73,11 @@ class Blocks(Protocol):
 
     @property
     def begin(self) -> int:
-        """Its first block."""
+        """Index of its first block."""
 
     @property
     def stop(self) -> int:
-        """The block behind its last."""
+        """Index of the block after its last one."""
 
 
 U = TypeVar("U", bound=Blocks)
@@ -120,7 +120,7 @@ class Section:
 
 
 class Let(NamedTuple):
-    """Assign a value, or check something."""
+    """Execute a function at this point of the flow: it assigns a value, or checks a condition and may raise."""
 
     do: Callable[[], object]
 

@@ -363,7 +363,7 @@ class ControlState(ABC):
         return {i: why for i, why in in_frame.items() if why is not AT_START or i in self.unknown}
 
     def stand(self, position: Vector, unknown: UnknownAxes, in_frame: UnknownAxes | None = None) -> None:
-        """Set the position after a motion that the control makes by itself, as behind a hole or after a return.
+        """Set the position after a motion that the control makes by itself, for example after a hole or a return.
 
         in_frame  unknown axes of the program's frame, if that tells more than `unknown`
         """

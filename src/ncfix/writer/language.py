@@ -34,8 +34,7 @@ class WrittenLanguage(FollowedLanguage):
     one_by_one  (program, moves, pieces, first piece of each motion) -> (n,) motions that cannot be written in bulk for
               reasons of the language; None: none
     held_angle  (program text, rotary axis, angle as programmed, corrected, one digit) -> the angle, degrees, that may
-                be
-              commanded instead of the corrected one; None: any angle
+              be commanded instead of the corrected one; None: any angle
     """
 
     writer: Callable[[Program, int, Any, Target, Spelling], Writer]

@@ -39,7 +39,7 @@ MAX_LENGTH_MM = 1e6
 """Largest plausible length or radius, mm; a larger number is a typing error."""
 COLUMNS = ("tool", "length", "radius", "diameter")
 WORDS = ("name", "description", "comment", "note")
-"""Columns for the reader, which ncfix ignores."""
+"""Columns of text for people; ncfix ignores them."""
 UNITS = {"mm": 1.0, "inch": INCH}
 OTHERWISE = "docs/formats.md lists the tables that are read; any other one as CSV with columns tool, length"
 
