@@ -7,7 +7,7 @@ import math
 from ncfix.control.coordinates import INDEX, LETTERS, TURN, Vector, mask_of, zeros
 from ncfix.control.expressions import Fault
 from ncfix.control.moves import MotionEnd, TcpState, UnknownAxes
-from ncfix.control.tcp import ALIKE, converted, led_in_machine
+from ncfix.control.tcp import EQUAL_TOLERANCE, converted, led_in_machine
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, HALF_A_TURN, POLAR, SHORTEST_WAY, TURNING, BlockWordValues
 
@@ -227,7 +227,7 @@ def machine_destination(control: Sinumerik, words: BlockWordValues) -> MotionEnd
     for index in GEOMETRY if on.tool_length or not control.tcp else ():
         if index not in control.axis_indices or toolless == 0.0:
             continue
-        if not known or abs(target[index] - without[index]) > ALIKE:
+        if not known or abs(target[index] - without[index]) > EQUAL_TOLERANCE:
             target[index] = without[index]
             if not known or toolless != 1.0:
                 unknown[index] = TOOL_ON_OR_OFF
