@@ -11,7 +11,7 @@ from compensate.machines_at_random import STROKE, TOPOLOGIES, perfect, random_ma
 from compensate.motions import Arc, changed, findings, interpolated, motions, plan
 from ncfix.compensate.plan.findings import Finding, Notes
 from ncfix.compensate.plan.intent import Intent
-from ncfix.compensate.plan.limits import FUZZ, increments_beyond_travel
+from ncfix.compensate.plan.limits import FUZZ, LOOKS, excess, increments_beyond_travel
 from ncfix.compensate.plan.path import Plan
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import WrittenPieces
@@ -122,6 +122,18 @@ def test_inside_a_tcp_block_axes_go_farther_than_at_its_ends() -> None:
     q = result.pieces.end
     assert (q[:, 2] < STROKE).all()
     assert found(machine, moves, result) == {"NCF404": [1]}
+
+
+@pytest.mark.parametrize("place", [0.3 / LOOKS, 0.5, 1 - 0.3 / LOOKS])
+def test_a_summit_between_two_looks_is_found(place: float) -> None:
+    """X rises to 1 um beyond its limit and falls again: next to an end of the motion, too."""
+    machine, top = perfect("w F X Y Z t"), STROKE + 1e-3
+
+    def joints(motion: np.ndarray, fraction: np.ndarray) -> np.ndarray:
+        return (top - 40.0 * (fraction - place) ** 2)[:, None] * [1.0, 0.0, 0.0]
+
+    far = excess(machine, joints, np.array([0]), np.array([True]))
+    assert far[0, 0] == pytest.approx(1e-3, abs=1e-9)  # the search shrinks its bracket to 4e-11
 
 
 @pytest.mark.parametrize(("beyond", "code"), [(0.005, "NCF404"), (-0.005, "NCF405"), (0.02, "")])
