@@ -67,7 +67,7 @@ SIEMENS = Dialect(
 
 @hookimpl
 def register_dialects(register: Register[Dialect]) -> None:
-    """Bring the dialect `siemens`."""
+    """Register the dialect `siemens`."""
     register(SIEMENS)
 
 
@@ -80,11 +80,11 @@ def sinumerik_codes() -> Mapping[str, Code]:
 
 @hookimpl
 def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None:
-    """Bring what the messages about SINUMERIK programs mean."""
+    """Register the codes of the messages about SINUMERIK programs."""
     register(sinumerik_codes, name="sinumerik")
 
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
-    """Bring the control `siemens`: CEC and EEC tables."""
+    """Register the control `siemens`: CEC and EEC tables."""
     register(made_by("ncfix_siemens.control:Siemens"), name="siemens")

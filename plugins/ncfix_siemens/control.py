@@ -61,7 +61,7 @@ class Siemens(FileControl):
     switch_off = SWITCH_OFF
 
     def _missing(self, given: Mapping[str, str]) -> Iterator[Message]:
-        """As of every control; if a setting is missing, `product_terms` is asked for at the same time."""
+        """See `FileControl`; if a setting is missing, `product_terms` is asked for at the same time."""
         missing = tuple(super()._missing(given))
         yield from missing
         if missing and "product_terms" not in given:

@@ -51,12 +51,12 @@ class Element:
 
     @property
     def end(self) -> complex | None:
-        """Its end; None unless both coordinates are given."""
+        """The end of the element; None unless both coordinates are given."""
         return None if self.x is None or self.y is None else complex(self.x, self.y)
 
     @property
     def circle(self) -> DirectedCircle | None:
-        """Its circle; None unless centre, radius and sense are given."""
+        """The circle of an arc; None unless centre, radius and sense are given."""
         if self.centre is None or self.radius is None or not self.sense:
             return None
         return DirectedCircle(self.centre, self.radius, self.sense)

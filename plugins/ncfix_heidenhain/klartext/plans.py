@@ -207,7 +207,7 @@ class QParameters:
         return self.values.get(name, Unknown(name))
 
     def assign(self, name: str, value: Value) -> None:
-        """Set a parameter."""
+        """Set a parameter, and count and note what that changes."""
         unknown, number = isinstance(value, Unknown), nominal(value)
         self.changes += name not in self.values or nominal(self.values[name]) != number or unknown
         self.values[name] = number
@@ -281,11 +281,11 @@ class QExpressions(Expressions):
     impossible = "{} cannot be computed here"
 
     def text(self, text: str) -> Evaluate:
-        """A string, or a word such as AUTO, which has no number."""
+        """The function that evaluates a string, or a word such as AUTO: it has no number."""
         return lambda scope: Unknown(text)
 
     def named(self, name: str) -> Evaluate:
-        """A Q parameter."""
+        """The function that evaluates a Q parameter."""
         return lambda scope: scope.parameters.get(name)
 
 

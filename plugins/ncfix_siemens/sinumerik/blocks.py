@@ -158,13 +158,13 @@ class SinumerikBuilder(TreeBuilder):
         return FunctionCall(name.lower(), places, indexed=True)
 
     def command(self, tree: Branch) -> Item:
-        """A name, perhaps with arguments."""
+        """The item of a name, which may have arguments."""
         name, *rest = tree.children
         arguments = self.arguments(rest[0]) if rest else ()
         return Command(str(name).lower(), arguments, bool(rest), self.span(tree))
 
     def indirect(self, tree: Branch) -> Item:
-        """`CALL "NAME"`."""
+        """The item of `CALL "NAME"`."""
         name, text = tree.children
         return Command(str(name).lower(), (StringLiteral(str(text)[1:-1]),), True, self.span(tree))
 
@@ -190,20 +190,20 @@ class SinumerikBuilder(TreeBuilder):
     # -- control structures -------------------------------------------------------------------------------------------
 
     def label_here(self, tree: Branch) -> Item:
-        """`NAME:`."""
+        """The item of a label, `NAME:`."""
         return OWordLine(str(tree.children[0]).rstrip(": \t").upper(), "label", (), self.span(tree))
 
     def condition(self, tree: Branch) -> Item:
-        """`IF`, `WHILE`, `UNTIL`."""
+        """The item of `IF`, `WHILE` or `UNTIL` with its condition."""
         keyword, value = tree.children
         return OWordLine("", str(keyword).lower(), (self.expression(value),), self.span(tree))
 
     def plain(self, tree: Branch) -> Item:
-        """A keyword alone."""
+        """The item of a keyword alone."""
         return OWordLine("", str(tree.children[0]).lower(), (), self.span(tree))
 
     def counted(self, tree: Branch) -> Item:
-        """`FOR name = first TO last`."""
+        """The item of `FOR name = first TO last`."""
         _, *target, first, _, last = tree.children
         values = (self.target(target), self.expression(first), self.expression(last))
         return OWordLine("", "for", values, self.span(tree))
@@ -247,7 +247,7 @@ class SinumerikBuilder(TreeBuilder):
         return () if values == (None,) else values
 
     def compound(self, tree: Branch, depth: int) -> Expression:
-        """The expression of a tree."""
+        """The expression that a parse tree stands for."""
         if depth > MAX_DEPTH:
             raise TooDeepError(edges(tree)[0])
         parts = tree.children

@@ -259,15 +259,15 @@ class VariableExpressions(Expressions):
         return super().compiled(expression, address)
 
     def numbered(self, index: Evaluate) -> Evaluate:
-        """`R[...]`."""
+        """The function that evaluates the R parameter `R[...]`."""
         return self.element("r", (index,))
 
     def named(self, name: str) -> Evaluate:
-        """A variable."""
+        """The function that evaluates a variable."""
         return lambda scope: scope.variables.value(name)
 
     def element(self, name: str, index: tuple[Evaluate, ...]) -> Evaluate:
-        """An element of an array."""
+        """The function that evaluates an element of an array."""
 
         def evaluate(scope: Scope) -> Value:
             places = tuple(number(part(scope)) for part in index)

@@ -155,7 +155,7 @@ def programmed_shift(control: Sinumerik, words: BlockWordValues, code: int) -> N
 
 
 def plane(control: Sinumerik, code: int) -> None:
-    """G17, G18, G19."""
+    """G17, G18, G19: choose the working plane, and put the tool length along the axis across it."""
     if PLANES[code] is not control.modal.plane:
         control.modes.pole, control.modes.polar, control.modes.in_plane = None, (None, None), False
     control.modal.plane = PLANES[code]
@@ -163,7 +163,7 @@ def plane(control: Sinumerik, code: int) -> None:
 
 
 def units(control: Sinumerik, code: int) -> None:
-    """G70, G71, G700, G710. With the first two feeds stay in the unit of the machine, see `INCH_MACHINE`."""
+    """G70, G71, G700, G710: inches or mm. With G70 and G71 feeds stay in the machine's unit, see `INCH_MACHINE`."""
     unit = INCH if code in (700, 7000) else 1.0
     basic = INCH if control.variables.value(INCH_MACHINE) == 0.0 else 1.0
     control.set_unit(unit, basic if code in (700, 710) else unit)
@@ -206,7 +206,7 @@ def path_mode(control: Sinumerik, code: int) -> None:
 
 
 def compensation(control: Sinumerik, code: int) -> None:
-    """G40, G41, G42."""
+    """G40, G41, G42: radius compensation off, left, right."""
     if code == 400:
         control.end_compensation()
     else:

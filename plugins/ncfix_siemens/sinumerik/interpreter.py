@@ -153,7 +153,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         return self.control.variables.changes
 
     def end_of_text(self) -> bool:
-        """The end of a subprogram returns, too."""
+        """See `Interpreter`: the end of the text of a subprogram returns to its caller."""
         if self.flow.calls:
             self.flow.finish()
             return True

@@ -357,7 +357,7 @@ def level(control: Sinumerik, plane: SwivelPlane) -> None:
 
 
 def take_plane(control: Sinumerik, frame: Affine) -> None:
-    """Set the frame of the plane."""
+    """Put a tilted plane into force; it deletes the programmable frame."""
     control.frames = replace(control.frames, plane=frame, programmable=WORLD)
     control.modes.swivelled = True
     control.switch_tcp()

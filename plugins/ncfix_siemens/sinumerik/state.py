@@ -130,7 +130,7 @@ class Sinumerik(ProgramControl):
     # -- frames -------------------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """As of every control; also updates `footing`."""
+        """See `ProgramControl`; also updates `footing`."""
         super().refresh()
         self.footing = self._footings(self.composed)
 
@@ -144,7 +144,7 @@ class Sinumerik(ProgramControl):
 
     @property
     def turns_in_plane(self) -> bool:
-        """As of every control."""
+        """See `ProgramControl`."""
         return self.modes.transformed and self.modes.orientation in IN_PLANE
 
     def spatial_anchor(self, index: int) -> Hashable:
@@ -212,7 +212,7 @@ class Sinumerik(ProgramControl):
         return leading
 
     def refuse_here(self, reason: str) -> None:
-        """As of every control."""
+        """See `ProgramControl`."""
         super().refuse_here(reason)
         self.lose_all(AFTER_THAT.format(reason))
 
@@ -341,7 +341,7 @@ class Sinumerik(ProgramControl):
             self.heading = steps[last, :3].tolist() if steps[last, :3].any() else None
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
-        """As of every control, but only if the program itself has set the motion code."""
+        """See `ProgramControl`, but only if the program itself has set the motion code."""
         return self.stated and super()._leaves_unknown(rapid)
 
     def counted_words(self, words: BlockWordValues) -> list[int]:
@@ -354,7 +354,7 @@ class Sinumerik(ProgramControl):
         return form == INCREMENTAL or (not form and self.modal.incremental)
 
     def ends_in_hole(self, motion: Motion) -> bool:
-        """As of every control; a modal cycle (MCALL) drills where motions end."""
+        """See `ProgramControl`; a modal cycle (MCALL) drills where motions end."""
         return super().ends_in_hole(motion) or self.modes.modal_cycle is not None
 
     def _style(self, kind: MotionKind, rule: Rule, reason: str, code: int, passing: Pass = Pass.NONE) -> int:
@@ -412,7 +412,7 @@ class Sinumerik(ProgramControl):
         return None if tool is None else tool.length
 
     def tool_radius(self) -> float:
-        """As of every control: the radius of the active cutting edge plus the allowance (OFFN), mm."""
+        """See `ProgramControl`: the radius of the active cutting edge plus the allowance (OFFN), mm."""
         tool = self._given(self.tools.spindle, self.edge)
         return math.nan if tool is None or tool.radius is None else tool.radius + self.allowance
 
@@ -422,7 +422,7 @@ class Sinumerik(ProgramControl):
         return self.setup.tool_called(name if edge == 1 else f"{name} D{edge}")
 
     def spindle_length(self) -> float:
-        """As of every control, by the names of tools."""
+        """See `ProgramControl`, by the names of tools."""
         number = self.tools.spindle
         known = self.given_length(number)
         if known is None and f"length of tool {self.named.name(number)}" in self.knowledge.assumed:
@@ -430,7 +430,7 @@ class Sinumerik(ProgramControl):
         return math.nan if known is None else known
 
     def length_under_tcp_with(self, tool: Vector, number: int | None) -> float:
-        """As of every control; with D0 the transformation leads the tip of a tool of no length."""
+        """See `ProgramControl`; with D0 the transformation leads the tip of a tool of length zero."""
         return tool[2]
 
 

@@ -130,7 +130,7 @@ class FileLikelihood:
 
     @property
     def data(self) -> ResidualData:
-        """The data."""
+        """The residual data of the diagnosis."""
         return self.evidence.background.data
 
     @cached_property

@@ -107,7 +107,7 @@ class Diagnosis:
 
     verdict        nothing-missing, found, ambiguous, unknown-effect
     findings       likeliest first
-    rest           the remainder without a name
+    rest           the part of the residuals for which no name was found
     gap, floor     residuals in um rms, and the noise
     machine        the machine with the findings added, or None if there is nothing to add
     before, after  (m,) residuals with the constants alone, and with the findings, um
@@ -144,7 +144,7 @@ class Diagnosis:
 
     @property
     def data(self) -> ResidualData:
-        """The residuals."""
+        """The residual data of the diagnosis."""
         return self.case.data
 
     @property
@@ -321,7 +321,7 @@ def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: fl
 
 
 def _owners(data: ResidualData, machine: Machine) -> list[Effect]:
-    """For each free constant, its effect in the new machine."""
+    """The effect in the new machine to which each free coefficient belongs, without its covariance."""
     free = [effect for effect, loose in zip(machine.effects, data.problem.selection.free, strict=False) if loose]
     return [replace(effect, covariance=None) for effect in free for _ in range(effect.basis.size)]
 
@@ -425,7 +425,7 @@ def _changes(found: Diagnosis, evidence: Evidence) -> Diagnosis:
 
 
 def _visible_size(data: ResidualData, shown: Sequence[Array]) -> float:
-    """Size of several effects together, um rms, beside set-up and constants."""
+    """Size of several effects together, um rms: of what set-up and constants cannot imitate of their sum."""
     return data.size(visible(data, np.sum([np.zeros(len(data.y)), *shown], axis=0)))
 
 

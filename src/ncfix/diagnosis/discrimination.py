@@ -153,7 +153,12 @@ def climbed(rounds: Sequence[Round], chosen: list[int]) -> list[int]:
 
 @frozen(repr=False, slots=False)
 class Hypothesis:
-    """A name as fitted: its likeliest form, the independent numbers of that, and several forms with sizes, um."""
+    """A candidate name as it was fitted to the data.
+
+    group    its likeliest form
+    numbers  the independent numbers of that form, um
+    forms    several of its forms, each with a size, um
+    """
 
     group: EffectForm
     numbers: Array

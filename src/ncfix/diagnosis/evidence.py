@@ -425,7 +425,7 @@ class Comparison:
         return self._plain(members) - self.paid(members)
 
     def paid(self, members: Members) -> float:
-        """Price of all members, log odds."""
+        """The price of choosing all members, log odds."""
         return sum(map(self.price, members)) + entry_price(len(members))
 
     def _plain(self, members: Members) -> float:
@@ -449,7 +449,7 @@ class Comparison:
         return tuple(name for name in self.evidence.names if self.evidence.forms[name][0] not in free)
 
     def all(self, members: Members) -> list[Member]:
-        """The members, and the free ones."""
+        """The members, and the effects that are always free."""
         return [*members.values(), *self.free]
 
     def price(self, name: str) -> float:

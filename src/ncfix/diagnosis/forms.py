@@ -68,7 +68,7 @@ DIRECTION = Candidate(
 POSE_LENGTHS = (0.8, 1.6)
 """Correlation lengths of a smooth field of all axes, in units of half their travels."""
 PAIR_LENGTH = 0.7
-"""The same for a product of functions of two axes."""
+"""Correlation length of a product of functions of two axes, in units of half their travels."""
 JERK = 300.0
 """Correlation time of a smooth course that is faster than thermal effects, s."""
 TIME_LENGTHS = (1200.0, 2400.0, 7200.0)
@@ -88,7 +88,7 @@ FULL_TURN = 270.0
 JOINT_BEND = 0.4
 """Correlation length of an unnamed error of a joint, in units of half its travel."""
 TIME_BEND = 0.3
-"""The same over time, in units of half of the time."""
+"""Correlation length over time of an unnamed error, in units of half of the time."""
 WAVES = (1.0, 0.7, 0.5, 0.3, 0.2, 0.2)
 """Variances of the harmonics of an unnamed error of a rotary axis."""
 PLAY = (1.0, 1.0, 0.5, 0.3)

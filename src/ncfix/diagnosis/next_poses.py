@@ -64,12 +64,13 @@ class Proposal:
 
     name     the name to be told from its rivals
     plan     rows of kind tcp without values; None if no pose helps
-    before   squared distance of the worst rival now, in units of the noise; after: with the new poses
+    before   squared distance of the worst rival now, in units of the noise
+    after    the same with the new poses
     chance   probability that a single name is left afterwards, 20 to 1 likelier than the others
     reason   why the data so far do not tell them apart
     alternatives  the rivals that the poses tell apart; without a plan: those that cannot be told apart
     alike    further rivals that no pose on offer tells from `name`
-    stuck    names that, if true, would keep a rival however often this is measured
+    stuck    names that, if true, would still have a rival however often these poses were measured
     beyond   axes that go beyond the travels measured so far
     tools    lengths of tools that were not used so far, mm
     strays   whether the tool tip leaves the space measured so far, in the workpiece frame

@@ -54,7 +54,7 @@ MOST_COURSES = 4
 UNKNOWN_NOISE = 1.0
 """Degrees of freedom of the prior noise if no file states it."""
 STATED_NOISE = 200.0
-"""The same if all files state it."""
+"""Degrees of freedom of the prior noise if all files state it."""
 GROSS, TAIL = 5.0, 3.0
 """Standard deviations from which on a value is an outlier, and from which on it gets less weight."""
 GENEROUS_SHARE = 2.5

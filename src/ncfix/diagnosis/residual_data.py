@@ -38,14 +38,16 @@ LEAST_UM, DOUBLED = 1.5, 4
 USUAL_NOISE_UM = 3.0
 """Noise of a value, um, for which the smallest sizes that matter are stated."""
 TIGHT_UM = 4.0
-"""Prior standard deviation of each constant, um at the tool tip, for a file that was right once. This and the next four
-are those of a machining centre of one metre; larger machines and arms have more."""
+"""Prior standard deviation of each constant, um at the tool tip, for a file that was right once.
+
+All prior standard deviations here are for a machining centre of one metre; larger machines and arms have more.
+"""
 AS_IT_STANDS_UM = 0.01
-"""The same if the unchanged file is judged, um."""
+"""Prior standard deviation of each constant if the unchanged file is judged, um."""
 USUAL_UM = 50.0
-"""The same for the constants of another machine, about zero, um."""
+"""Prior standard deviation about zero of each constant of another machine, um."""
 FREE_UM = 500.0
-"""The same for free constants, um: finite, else undetermined combinations would run away."""
+"""Prior standard deviation of free constants, um: finite, else undetermined combinations would run away."""
 LOOSE_UM = 200.0
 """Prior standard deviation of the additional `loose` effects, um: the set-up takes what both could explain."""
 WIDE_UM = 1e5

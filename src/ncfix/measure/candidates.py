@@ -172,7 +172,7 @@ def _drawn(machine: Machine, count: int, room: Room, random: np.random.Generator
 
 
 def _sides(axis: Axis, position: Array, wanted: Array, room: Room) -> Array:
-    """Direction of approach, 1 or -1, as wanted, except near an end of the range: from the inside there."""
+    """The wanted directions of approach, 1 or -1; near an end of the range that from the inside."""
     low, high = room.of(axis)
     step = APPROACH["rotary" if axis.rotary else "linear"]
     return np.where(position - low < step, -1.0, np.where(high - position < step, 1.0, wanted))

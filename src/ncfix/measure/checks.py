@@ -17,7 +17,7 @@ from ncfix.measure.measurement import CENTRE, ENDS, Measurement, component_of, g
 LARGE_MM, LARGE_RAD = 2.0, 0.02
 """Median errors of the tool tip above this are probably in another unit."""
 BEYOND_MUCH = 10.0
-"""The same limit for an error motion of one axis, in units of a large one (`plausible.much`)."""
+"""Error motions of one axis above this, in units of a large one (`plausible.much`), are probably in another unit."""
 SMALL_MM = 1e-4
 """Errors of one axis that nowhere exceed this, mm, are probably in another unit."""
 ROUND_DEG = 1e-6

@@ -27,9 +27,9 @@ ODD = {"NCF614", "NCF615", "NCF616"}
 BETTER = 0.2
 """Largest ratio of the squared residuals after and before undoing a mistake, for it to be suspected."""
 LIKELY = 0.5
-"""The same if the file has a remark of `ODD`."""
+"""This ratio for a file that has a remark of `ODD`."""
 NOISE = 0.3
-"""The same if the residual after undoing it is only noise."""
+"""This ratio if only noise is left after undoing the mistake."""
 SIMILAR = 1.5
 """Among column orders and signs with residuals within this factor of the smallest, the simplest is chosen."""
 CHANCE = 1e-3
@@ -218,7 +218,7 @@ def _units(file: int, measurement: Measurement, machine: Machine) -> Iterator[Su
 
 
 def _turned(file: int, measurement: Measurement, machine: Machine) -> Iterator[Suspect]:
-    """Suspects: an axis whose positions have the wrong sign."""
+    """The suspects that the positions of one axis have the wrong sign."""
     for axis in machine.axes:
         name = axis.name
         columns = {each: -measurement.columns[each] for each in _of(measurement, name)}
@@ -341,7 +341,10 @@ def _exchanged(data: Sequence[Measurement], readings: _Readings) -> Iterator[tup
 
 
 def _negated(data: Sequence[Measurement], readings: _Readings) -> Iterator[tuple[_Left, Suspect, int]]:
-    """A suspect of several sets with the wrong sign, found one after another; with residuals and the number tried."""
+    """A suspect: several sets with the wrong sign, which are found one after another.
+
+    With it come its residuals and the number of sets that were tried.
+    """
     kinds = ("tcp", "tcp6", "axis")
     every = {(file, name): rows for file, name, rows in _sets(data) if data[file].kind in kinds}
     if len(every) < 3:

@@ -191,7 +191,7 @@ class Region:
 
     @property
     def _lever(self) -> Array:
-        """(n_axes,) mm per mm or rad of each axis."""
+        """(n_axes,) how far the tip moves, mm, per mm or rad of each axis; rotary axes act at `RADIUS`."""
         return np.where(self.machine.rotary, RADIUS, 1.0)
 
 

@@ -40,7 +40,7 @@ ROUNDS = 40
 SWEEPS = 2
 """Number of sweeps over all pairs in a round."""
 FIRST = 4
-"""The same in the first round."""
+"""Number of sweeps over all pairs in the first round."""
 CLOSE_RATIO = 1.04
 """Ratio of the largest error to the bound at which the iteration ends."""
 BASE = 0.05

@@ -46,7 +46,7 @@ Key = tuple[OutputWay, int]
 NODES = 8
 """Number of positions of each axis at which the correction is decomposed; fewer for more than `FULL` axes."""
 PROVEN = 10
-"""The same for the reported bound: more positions prove more."""
+"""Number of positions of each axis for the reported bound: more positions prove more."""
 FULL = 5
 """Largest number of axes with the full number of positions each."""
 LEVER = 200.0
@@ -71,7 +71,7 @@ class PartSelection:
 
     faces      the decomposition of each face
     tolerance  rms that may be lost when tables are merged
-    free       axes whose sum over themselves takes no table of this kind
+    free       axes whose correction by their own position needs no table of this kind
     chosen     the parts for which tables are made
     silent     faces of which even the constant is dropped
     beside     further tables for each table that multiplies others, and for each that is multiplied

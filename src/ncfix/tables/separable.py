@@ -63,7 +63,7 @@ class Product:
         return self.first if axis == self.axes[0] else self.second
 
     def across(self, axis: int) -> int:
-        """The other axis."""
+        """The other of the two axes."""
         return self.axes[1] if axis == self.axes[0] else self.axes[0]
 
 
@@ -249,7 +249,7 @@ def _as_shares(goal_bytes: bytes, size: float, centres: tuple[bytes, ...], toler
 
 
 def absorbed(layout: TableLayout, tolerance: float) -> TableLayout:
-    """The same function with fewer tables: sums that are combinations of factors of products are hidden in these.
+    """The same function with fewer tables: a sum that factors of products can express is added to these factors.
 
     The values may be those at nodes or at any other positions. The constant goes into a sum if there is one.
     """

@@ -124,7 +124,7 @@ def contour_call(control: Sinumerik, step: Calling) -> None:
 
 
 def along_contour(control: Sinumerik, block: int, drilling: Drilling, place: tuple[float, float]) -> Callable[[], None]:
-    """Down to the bottom of a contour, where that begins; what is to be done behind its last block."""
+    """Move down to the bottom of a contour at its first block; returns what to call after its last block."""
     take_up(control)
     mind_carried(control)
     control.use_all_start_positions()

@@ -171,7 +171,7 @@ def _in_radians(machine: Machine, index: int) -> Machine:
 
 
 def _stretch(measurements: tuple[Measurement, ...], axes: Sequence[str], factor: float) -> float:
-    """Factor on the readings, geometric mean, if positions of these axes are scaled: a probe reads axis positions."""
+    """The mean factor on readings if positions of these axes are scaled by `factor`: a probe reads axis positions."""
     names = {*axes, *(f"m{axis.lower()}" for axis in axes)}
     shares = [len(names & set(each.measured)) / max(len(each.measured), 1) for each in measurements]
     return float(factor ** np.mean(shares))
