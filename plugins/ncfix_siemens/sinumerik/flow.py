@@ -12,6 +12,7 @@ from ncfix.control.expressions import Evaluate, Fault, Unknown, Value, number
 from ncfix.control.flow import NO_LABEL, Jump, Let, OpenCall, Operation, ProgramFlow, Repeat, Section
 from ncfix.text.tree import Expression, NamedParameter, NumberedParameter
 from ncfix_siemens.sinumerik.expressions import Key, Local, compiled, name_of, of_kind, renamed
+from ncfix_siemens.sinumerik.framing import set_length
 from ncfix_siemens.sinumerik.plans import AssignedVariable, Branching
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import BROKEN, SinumerikUnit
@@ -288,6 +289,7 @@ class SinumerikFlow(ProgramFlow[SinumerikUnit]):
                         variables.assign(key, value)
             if saved is not None:
                 control.restore(*saved)
+                set_length(control)
 
         variables.scopes.append(local)
         return OpenCall(unit.name, (unit, unit.begin), times - 1, leave=leave)

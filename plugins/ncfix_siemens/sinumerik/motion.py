@@ -110,6 +110,8 @@ def by_itself(control: Sinumerik, words: BlockWordValues, special: frozenset[str
     elif "soft" in special:
         refused(control, words, control.modal.motion, "a soft approach or retraction (G147, G148, ...)")
         control.lose(GEOMETRY, AFTER_APPROACH)
+    elif "g63" in special:
+        refused(control, words, control.modal.motion, "tapping (G63)")
     else:
         as_coded(control, words, control.modal.motion)
 

@@ -174,12 +174,15 @@ class Sinumerik(ProgramControl):
             self.knowledge.work_offset(self.frames.name)
 
     def restore(self, modal: Modal, modes: Modes, frames: FrameStack) -> None:
-        """Restore the state before a subprogram with SAVE, except motion code, feed and transformations."""
-        motion, straight, feed = self.modal.motion, self.modal.straight, self.modal.feed
+        """Restore the state before a subprogram with SAVE, except feed, spindle and transformations."""
         if frames.plane != self.frames.plane:
             self.suspend("tilt", "a swivelled plane (CYCLE800) of a subprogram with SAVE, which may stay in force")
-        self.modal, self.frames = modal, replace(frames, plane=self.frames.plane)
-        self.modal.motion, self.modal.straight, self.modal.feed = motion, straight, feed
+        if not modal.compensated:
+            self.end_compensation()
+        now, self.modal, self.frames = self.modal, modal, replace(frames, plane=self.frames.plane)
+        modal.speed, modal.spindle, modal.feed, modal.feed_given = now.speed, now.spindle, now.feed, now.feed_given
+        if now.feed_mode != modal.feed_mode:
+            modal.feed, modal.feed_given = math.nan, False
         transformed, swivelled = self.modes.transformed, self.modes.swivelled
         self.modes = modes
         self.modes.transformed, self.modes.swivelled = transformed, swivelled

@@ -177,7 +177,7 @@ STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
 
 WORKING_AREA = frozenset({250, 260})
 """G25 and G26, whose words are limits of the working area or of the spindle."""
-FOR_THIS_BLOCK = {530: "g53", 1530: "g153"} | dict.fromkeys(motion.SOFT_APPROACH, "soft")
+FOR_THIS_BLOCK = {530: "g53", 1530: "g153", 630: "g63"} | dict.fromkeys(motion.SOFT_APPROACH, "soft")
 TAKES_WORDS = frozenset({40, 740, 750, 580, 590}) | POLES | WORKING_AREA
 
 
@@ -187,7 +187,7 @@ class Turn:
 
     words       the values of its words; plan: of its shape
     at_once     T alone changes the tool
-    special     statements that apply to this block only: `supa`, `g53`, `meas`, `soft`
+    special     statements that apply to this block only: `supa`, `g53`, `g63`, `meas`, `soft`
     frame       name of a frame instruction, which takes the axis words
     subprogram  the subprogram that is called after the block, with `arguments` (as `written`), `times` times
     called      the statement that calls it

@@ -68,7 +68,6 @@ UNFOLLOWED_MOTIONS = {
     332: "rigid tapping (G332)",
     340: "threading (G34)",
     350: "threading (G35)",
-    630: "tapping (G63)",
     3310: "rigid tapping (G331)",
     3320: "rigid tapping (G332)",
     3350: "threading (G335)",

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ncfix.compensate.following import kinematics_of
-from ncfix.control.moves import Rule, TcpState
+from ncfix.control.moves import MotionKind, Rule, TcpState
 from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import SourceError, UsageError
 from ncfix.machine.file import load
@@ -108,6 +108,43 @@ def test_save_brings_modal_codes_back() -> None:
     files = {"SUB1": "PROC SUB1 SAVE\nG91\nM17", "SUB2": "PROC SUB2\nG91\nM17"}
     assert xs("G0 X5\nSUB1\nG0 X1", files=files)[-1] == 1
     assert xs("G0 X5\nSUB2\nG0 X1", files=files)[-1] == 6
+
+
+@pytest.mark.parametrize(
+    ("inside", "before", "after", "end"),
+    [
+        ("G18 G0 X1", "G1", "X1 Y2 Z3", [1, 2, 103]),
+        ("G0 X1", "G1", "X1 Y2 Z3", [1, 2, 103]),
+        ("G700 G91", "G1", "X1 Y2 Z3", [1, 2, 103]),
+        ("G18 G1 X1", "G2", "X8 Y4 I3.5 J0", [8, 4, 103]),
+    ],
+)
+def test_save_brings_back_plane_unit_and_motion(inside: str, before: str, after: str, end: list[float]) -> None:
+    text = f"G17 G90 G710 T1 D1 F100\nG0 X4 Y4 Z3\n{before} X4 Y4 I4\nSUB1\n{after}"
+    text = text if before == "G2" else text.replace(" I4", "")
+    given = {"tools": {1: Tool(length=100.0)}, "variables": {"$SC_TOOL_LENGTH_CONST": 0}}
+    found = follow(f"{text}\nM30\n%_N_SUB1_SPF\nPROC SUB1 SAVE\n{inside}\nM17", **given)
+    assert found.moves.end[-1].tolist() == pytest.approx(end)
+    assert found.moves.kind[-1] == {"G1": MotionKind.FEED, "G2": MotionKind.ARC}[before]
+
+
+@pytest.mark.parametrize("end", ["PROC SUB1 SAVE\nG41 G1 X9 F100\nX19", "PROC SUB1\nG41 G1 X9 F100\nX19\nG40 G90 G0"])
+def test_save_ends_the_contour_of_a_subprogram(end: str) -> None:
+    found = follow(f"G0 X1 Y1 Z1\nSUB1\nG0 Z5\nM30\n%_N_SUB1_SPF\n{end}\nM17")
+    assert found.moves.placed is not None
+    assert found.moves.placed[-1].tolist() == [False, False, True]  # X and Y stand beside the contour
+
+
+def test_the_feed_of_another_kind_does_not_outlast_save() -> None:
+    found = follow("G94 G1 X1 Y1 Z1 F100\nSUB1\nX2\nM30\n%_N_SUB1_SPF\nPROC SUB1 SAVE\nG95 X9 F0.2\nM17")
+    assert found.moves.feed.tolist() == pytest.approx([100, 0.2, math.nan], nan_ok=True)
+
+
+def test_tapping_with_g63_lasts_for_its_block() -> None:
+    found = follow("G0 X1 Y1 Z1\nG63 Z-5 F100\nG63 Z1\nX2\nG1 G63 Z-5\nZ1")
+    refused = [Rule.REFUSE if line in (1, 2, 4) else Rule.CORRECT for line in range(6)]
+    assert found.moves.rule.tolist() == refused
+    assert found.moves.kind[[3, 5]].tolist() == [MotionKind.RAPID, MotionKind.FEED]
 
 
 # -- what is known only at run time -----------------------------------------------------------------------------------
