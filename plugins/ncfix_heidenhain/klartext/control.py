@@ -109,6 +109,7 @@ class KlartextControl(base.ProgramControl):
     functions       the transformations that were set by a TRANS function, not by a cycle
     m128            tool centre point control is on (M128, FUNCTION TCPM)
     shortest        rotary axes take the shorter way (M126)
+    per_revolution  F is per revolution (M136)
     auto_feed       feed of the last TOOL CALL, mm/min
     oversize        DL of the last TOOL CALL, mm
     preset_checked  the active preset is given in the setup, or a lack of it has been reported
@@ -132,7 +133,7 @@ class KlartextControl(base.ProgramControl):
         self.path = PathFunctionState()
         self.cycle = CycleInForce()
         self.m128 = run.setup.tcp
-        self.shortest = False
+        self.shortest = self.per_revolution = False
         self.auto_feed = math.nan
         self.oversize = 0.0
         self.preset_checked = False

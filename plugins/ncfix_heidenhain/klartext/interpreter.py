@@ -327,12 +327,14 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
                 self.span = None
 
     def feed(self, words: MotionWords, plan: KlartextPlan) -> None:
-        """Set the feed: F per minute, FU per revolution, FAUTO that of the last TOOL CALL.
+        """Set the feed: F per minute or (M136) per revolution, FU per revolution, FAUTO that of TOOL CALL.
 
-        FZ (per tooth) and FT (by time) leave it unknown.
+        FZ (per tooth) and FT (by time) leave it unknown. The feed of RND and CHF is only that of the corner.
         """
         modal = self.control.modal
-        for address, mode in (("F", 94), ("FU", 95), ("FZ", 95), ("FT", 94)):
+        if plan.name in CORNERS:
+            return
+        for address, mode in (("F", 95 if self.control.per_revolution else 94), ("FU", 95), ("FZ", 95), ("FT", 94)):
             if address in words.values:
                 known = address not in words.unknown and address in ("F", "FU")
                 modal.feed = words.values[address] * modal.per_feed if known else math.nan

@@ -127,7 +127,7 @@ def before_motion(control: KlartextControl, step: Step) -> None:
     if 126 in step.codes:
         control.shortest = True
     if 136 in step.codes:
-        control.modal.feed_mode = 95
+        control.per_revolution, control.modal.feed_mode = True, 95
     if 128 in step.codes:
         tip_control(control, on=True)
     if 142 in step.codes and not is_untransformed(control):
@@ -179,7 +179,7 @@ def after_motion(control: KlartextControl, code: int, own: MotionWords, flags: f
     elif code == 127:
         end_of_short_ways(control)
     elif code == 137:
-        control.modal.feed_mode = 94
+        control.per_revolution, control.modal.feed_mode = False, 94
     elif code in ENDING:
         control.resume(f"M{ENDING[code]}")
     elif code == 140:

@@ -29,6 +29,17 @@ def test_rapids_last_for_their_block() -> None:
     assert moves.feed.tolist() == [100, 100, 100]
 
 
+def test_the_feed_of_a_corner_holds_for_the_corner() -> None:
+    moves = follow("L X+1 F100\nRND R0.2 F20\nL Y+5\nCHF 0.1 F30\nL X+3\nL X+4 F50").moves
+    assert moves.feed.tolist() == [100, 100, 100, 50]
+
+
+def test_feeds_per_revolution() -> None:
+    moves = follow("L X+1 F100\nL X+2 F0.3 M136\nL X+3 F0.2\nL X+4 F0.1 M137\nL X+5 F50\nL X+6 FU0.4\nL X+7 F60").moves
+    assert moves.feed.tolist() == [100, 0.3, 0.2, 0.1, 50, 0.4, 60]
+    assert moves.feed_mode.tolist() == [94, 95, 95, 95, 94, 95, 94]
+
+
 def test_inches() -> None:
     assert ends("L X+1 F10", unit="INCH") == [[25.4, 0, 0]]
 
