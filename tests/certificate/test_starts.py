@@ -236,6 +236,14 @@ def test_a_surface_normal_is_not_followed_and_all_behind_it_is() -> None:
     assert sorted(proof.left) == [6, 7]  # pieces may belong to either
 
 
+def test_pieces_of_a_motion_with_a_direction_of_the_tool_are_its_own() -> None:
+    blocks = ["BEGIN PGM A MM", "TOOL CALL 1 Z S8000", "L X+0 Y+0 Z+90 A+0 C+0 R0 FMAX", "M128"]
+    blocks += ["L X+10 Y+5 Z+2 A+5 C+40 F900", "LN X+130 Y+200 Z+2 TX+0.3 TY+0.2 TZ+0.9", "CC X+130 Y+190"]
+    blocks += ["C X+140 Y+190 DR-", "L IX+5 IC+5", "M129", "L Z+90 R0 FMAX M30", "END PGM A MM"]
+    text = "".join(f"{number} {block}\n" for number, block in enumerate(blocks)).encode()
+    assert proof_of(text, "table", {}, "heidenhain").faults == []
+
+
 def test_an_end_of_the_program_that_is_lost_is_a_fault() -> None:
     text = b"%\nO1(A)\nG21 G90 G17\nG0 X1. Y2. Z9.\nG1 X5. F300.\nM30\n%\n"
     known, setup, given = machine("three"), Setup(assume_zero=True), Given(assume_zero=True)

@@ -30,7 +30,9 @@ SEVERAL = 3
 """Number of lines that must agree one by one before the following ones are compared in columns."""
 MOTION = {
     Family.WORDS: re.compile(r"[ \t]*(?<![A-Z])G[ \t]*0?[0-3](?![\d.])", re.IGNORECASE),
-    Family.KLARTEXT: re.compile(r"[ \t]*(?<![\w.])(?:L|CC|CP|CR|C|DR[+-])(?![\w.+-])", re.IGNORECASE),
+    Family.KLARTEXT: re.compile(
+        rf"[ \t]*(?<![\w.])(?:(?:LN|L|CC|CP|CR|C|DR[+-])(?![\w.+-])|T[XYZ][ \t]*{NUMBER})", re.IGNORECASE
+    ),
 }
 STOPS = re.compile(r"[ \t]*(?<![A-Z])(?:M[ \t]*0*(?:0|1|2|30|60)|G[ \t]*0*9)(?![\d.])", re.IGNORECASE)
 """Words that stop the program or the motion at the end of a block."""
