@@ -181,7 +181,7 @@ class Sinumerik(ProgramControl):
             self.end_compensation()
         now, self.modal, self.frames = self.modal, modal, replace(frames, plane=self.frames.plane)
         modal.speed, modal.spindle, modal.feed, modal.feed_given = now.speed, now.spindle, now.feed, now.feed_given
-        if now.feed_mode != modal.feed_mode:
+        if (now.feed_mode, now.per_feed) != (modal.feed_mode, modal.per_feed):
             modal.feed, modal.feed_given = math.nan, False
         transformed, swivelled = self.modes.transformed, self.modes.swivelled
         self.modes = modes
