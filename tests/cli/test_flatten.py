@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-LOOP = "O1\nG90 G54 G0 X0. Y0. Z50.\n#1=0\nWHILE[#1LT3]DO1\nG0 X[10.*#1] Y5000\n#1=#1+1\nEND1\nM30\n"
+LOOP = "O1\nG90 G54 G0 X0. Y0. Z50.\n#1=0\nWHILE[#1LT3]DO1\nG0 X[10.*#1] Y5000\n#1=#1+1\nEND1\nM30\nO2\nX7.\nM30\n"
 
 
 def test_a_loop_is_refused_and_with_flatten_written_out(ncfix: Any, root: Path, tmp_path: Path) -> None:
@@ -17,7 +17,9 @@ def test_a_loop_is_refused_and_with_flatten_written_out(ncfix: Any, root: Path, 
     assert [each["line"] for each in refused.json()["files"][0]["refused"]] == [5]
     fixed = ncfix("fix", program, *common, "--flatten")
     assert fixed.code == 0
-    assert "NCF445" in {each["code"] for each in fixed.json()["files"][0]["warnings"]}
+    warnings = {each["code"]: each for each in fixed.json()["files"][0]["warnings"]}
+    assert "NCF445" in warnings
+    assert "the flat program does not have them" in warnings["NCF249"]["hint"]
     text = (tmp_path / "out.nc").read_text()
     assert "WHILE" not in text
     assert text.startswith("O1\n(NCFIX ")

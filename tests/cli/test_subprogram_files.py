@@ -64,9 +64,10 @@ def test_one_that_is_named_is_corrected_with_a_remark(ncfix: Any, machine: Path,
         f"MACHINE: MILL 7\nFILE: PART\n%\nO1\n{HEAD}{CUT}M30\n%\n",
         f"O1\nM30\nO2\n{HEAD}{CUT}M30\n",
         f"O1\nGOTO 9\n{HEAD}{CUT}N9 M30\n",
+        f"O1\nG21 G91 G28 Z0.\n:0030 T1 M6\nG90\n{HEAD}{CUT}M30\n",
     ],
 )
-def test_a_text_in_which_nothing_moves_that_is_followed_is_refused(
+def test_a_text_of_which_nothing_is_corrected_that_is_followed_is_refused(
     ncfix: Any, machine: Path, tmp_path: Path, text: str, flatten: tuple[str, ...]
 ) -> None:
     """Written out flat it would lose all its blocks."""

@@ -1,110 +1,21 @@
-"""Compositions as programs of the RS274 and Fanuc families."""
+"""Compositions as programs of the RS274 and Fanuc families: what the path is made of."""
 
 from __future__ import annotations
 
 import random
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from metamorphic.composing import (
-    FEED,
-    PLANES,
-    SECOND,
-    SHORT,
-    SPEED,
-    Author,
-    Frame,
-    Vector,
-    number,
-    scaled,
-    shifted,
-    turned,
-)
-from metamorphic.harness import LENGTH
-
-MACRO = ("fanuc", "haas", "mitsubishi")
-LENGTHS = {1: LENGTH, 2: SHORT}
+from metamorphic.composing import FEED, PLANES, Vector, number, turned
+from metamorphic.iso_modes import MACRO, IsoModes
 
 
-class IsoAuthor(Author):
-    """Blocks of G codes; what a dialect has not is left out."""
-
-    comment = "(here)"
-
-    def begin(self) -> None:
-        self.tool, self.fed, self.prefix, self.plane = 1, "", "", False
-        self.rates, self.way, self.pointing, self.repeated = "G94", 0.0, False, False
-        self.loops: list[int] = []
-        self.second, self.kept = False, SECOND
-        self.shift, self.local, self.rotation, self.mirror = Frame(), Frame(), Frame(), Frame()
-        self.lines += ["%", "O1"] if self.dialect in MACRO else []
-        self.lines += ["G21 G17 G40 G49 G80 G90 G94 S1000", "G54"]
-
-    def finish(self) -> str:
-        if self.dialect == "linuxcnc":
-            return "\n".join([*self.behind, *self.lines, "M30"]) + "\n"
-        return "\n".join([*self.lines, "M30", *self.behind, "%"]) + "\n"
+class IsoAuthor(IsoModes):
+    """Motions, holes, contours and calls."""
 
     # -- words --------------------------------------------------------------------------------------------------------
-
-    def mode(self, codes: str) -> None:
-        """Codes on a line of their own, or in front of the next motion."""
-        self.alone(codes)
-        if self.often(0.3):
-            self.prefix = self.lines.pop() + " "
-
-    def alone(self, line: str, moves: bool = False) -> None:
-        """A line that is no plain motion."""
-        self.flush()
-        self.put(line, moves)
-
-    def flush(self) -> None:
-        """The codes that wait for a motion."""
-        if self.prefix:
-            self.put(self.prefix.strip())
-        self.prefix = ""
-
-    def word(self, letter: str, value: float) -> str:
-        """A word, sometimes computed."""
-        text = number(value, 6)
-        if self.dialect != "iso" and self.often(0.1):
-            return f"{letter}[{number(value - 3.0, 6)}+3.]"
-        if self.dialect != "iso" and self.often(0.1):
-            name = f"#{100 + 'XYZABCR'.index(letter)}"
-            self.put(f"{name}={text}")
-            return letter + name
-        return letter + text
-
-    def motion(self, code: str, words: list[str]) -> None:
-        """A motion block."""
-        feed = self.feed()
-        if code == "0" or (feed == self.fed and self.rates != "G93" and self.often(0.7)):
-            feed = ""
-        else:
-            self.fed = feed
-        if self.often(0.3):
-            self.style.shuffle(words)
-        parts = [*([] if code == self.code and self.often(0.6) else [f"G{code}"]), *words, *([feed] if feed else [])]
-        if self.often(0.1):
-            self.style.shuffle(parts)
-        self.code = code
-        self.put(self.prefix + (" " if not self.often(0.1) else "").join(parts), moves=True)
-        self.prefix = ""
-
-    rate = 1.0
-
-    def feed(self) -> str:
-        """F of 500 mm/min, as a rate of the way that is before the tool, or per revolution."""
-        if self.rates == "G93":
-            return f"F{number(FEED / (self.way or FEED), 8)}"
-        return f"F{number(FEED / self.rate / (SPEED if self.rates == 'G95' else 1.0), 7)}"
-
-    def minutes(self) -> None:
-        """G94, if that is not in force."""
-        if self.rates != "G94":
-            self.feeds(self.style)
 
     def directed(self, target: Vector, values: dict[str, float]) -> list[str]:
         """The words of rotary axes, or of the direction to which they turn the tool, taken out of a motion's."""
@@ -132,17 +43,25 @@ class IsoAuthor(Author):
         polar = polar and self.flat and self.dialect in (*MACRO, "linuxcnc") and code in ("0", "1") and self.often(0.15)
         if polar:
             values |= {"X": float(np.hypot(*across)), "Y": float(np.degrees(np.arctan2(across[1], across[0])))}
+        halved = (
+            not (extra or polar or self.exact or self.tcp or self.pointing)
+            and self.plain_frame()
+            and code in ("0", "1")
+        )
+        halved = halved and self.flat and self.dialect in MACRO and not self.steps and self.often(0.1)
+        if halved:
+            values |= {letter: value / 2.0 for letter, value in values.items() if letter in "XYZ"}
         vector = self.directed(target, values)
         words = [*(self.word(letter, value) for letter, value in values.items()), *vector]
         if polar and self.dialect == "linuxcnc":
             words = [{"X": "@", "Y": "^"}.get(word[0], word[0]) + word[1:] for word in words]
             polar = False
-        if polar:
-            self.alone("G16")
+        if polar or halved:
+            self.alone("G16" if polar else "G51 X0. Y0. Z0. P2.")
         self.q = target
         self.motion(code, [*words, *(extra or [])])
-        if polar:
-            self.alone("G15")
+        if polar or halved:
+            self.alone("G15" if polar else "G50")
         if steps:
             self.increments(self.style)
 
@@ -232,6 +151,7 @@ class IsoAuthor(Author):
         depth[2] -= chance.uniform(5, 20)
         level = self.q.copy()
         level[2] -= 2.0
+        code, more = chance.choice(self.CYCLES if self.dialect != "siemens" else self.CYCLES[:1])
         for n in range(chance.randint(1, 3)):
             where = self.somewhere(chance)
             depth[:2] = level[:2] = home[:2] = where[:2]
@@ -239,11 +159,63 @@ class IsoAuthor(Author):
             words = [self.word("XYZ"[k], there[k]) for k in range(2)]
             if n == 0 or not self.often(0.7):
                 words += [self.word("Z", there[2]), self.word("R", top)]
-            self.motion("81", [*([back] if n == 0 else []), *words])
+            if more == "P":
+                words.append("P0.5" if self.dialect == "linuxcnc" else "P500")
+            elif more == "Q":
+                words.append(f"Q{number(2.0 / self.unit, 6)}")
+            self.motion(code, [*([back] if n == 0 else []), *words])
+        if chance.random() < 0.3:
+            step = np.array([chance.uniform(-6, 6), chance.uniform(-6, 6)]).round(2)
+            self.row(code, [(depth[:2] + k * step).round(6) for k in (1, 2)], depth)
+            level[:2] = home[:2] = depth[:2]
         self.q = home if back == "G98" else level.copy()
         self.alone("G80")
         self.code, self.fed = "", ""
         self.unsaid |= {"Z"}
+
+    def row(self, code: str, holes: Sequence[Vector], depth: Vector) -> None:
+        """Holes at equal steps from where one was drilled, down to a depth; sometimes repeats of one block in G91."""
+        before = self.place(depth)
+        for where in holes:
+            depth[:2] = where
+            if not (self.wild and self.flat and self.dialect in MACRO):
+                self.motion(
+                    code,
+                    [
+                        f"{letter}{number(v, 6)}"
+                        for letter, v in zip("XY", self.place(depth)[:2] / self.unit, strict=True)
+                    ],
+                )
+        if self.wild and self.flat and self.dialect in MACRO:
+            step = (self.place(depth) - before)[:2] / len(holes) / self.unit
+            repeats = f"{'L' if self.dialect == 'haas' else 'K'}{len(holes)}"
+            self.alone("G91")
+            self.motion(code, [f"X{number(step[0], 7)}", f"Y{number(step[1], 7)}", repeats])
+            self.alone("G90")
+
+    def pecked(self, chance: random.Random) -> None:
+        """Down and up again at some places; sometimes by a macro that is called behind every motion."""
+        self.minutes()
+        self.absolute()
+        places, down = [self.somewhere(chance) for _ in range(2)], round(chance.uniform(2, 5), 2)
+        called = self.wild and self.flat and self.dialect in MACRO
+        if called:
+            name, rate = next(self.names), number(FEED / self.rate, 6)
+            lines = ["G91", "G1 Z-[#26] F#9", "Z#26", "G90"]
+            self.alone(f"G66 P{7000 + name} Z{number(down / self.unit, 6)} F{rate}")
+            self.behind += self.subprogram(name, lines)
+        for place in places:
+            self.go("1", place)
+            below = place - np.array([0.0, 0.0, down, 0.0, 0.0])
+            for each in () if called else (below, place):
+                self.go("1", each)
+            if called:
+                self.code, self.fed = "", ""
+        if called:
+            self.alone("G67")
+
+    CYCLES = (("81", ""), ("82", "P"), ("83", "Q"), ("73", "Q"), ("85", ""), ("89", "P"))
+    """Codes of cycles, and what they need besides."""
 
     def contour(self, chance: random.Random) -> None:
         """Lines with cutter radius compensation, turning to the right of the tool all the time."""
@@ -382,265 +354,8 @@ class IsoAuthor(Author):
         self.alone(f"G4 P{0.5 if self.dialect == 'linuxcnc' else 500}")
         self.code = "" if self.dialect == "iso" else self.code
 
-    # -- rewrites -----------------------------------------------------------------------------------------------------
-
-    def absolute(self) -> None:
-        """G90, if that is not in force."""
-        if self.steps:
-            self.steps = False
-            self.mode("G90")
-
-    def increments(self, chance: random.Random) -> None:
-        if self.steps:
-            self.absolute()
-        else:
-            self.mode("G91")
-            self.steps = True
-
-    def feeds(self, chance: random.Random) -> None:
-        """F by the time that a motion takes, or per revolution, or per minute again."""
-        if not self.rotary:
-            self.rates = "G94" if self.rates != "G94" else chance.choice(["G93", "G95"])
-            self.mode(self.rates)
-            self.fed = ""
-
-    diameter = False
-
-    def units(self, chance: random.Random) -> None:
-        self.unit = self.rate = 25.4 if self.unit == 1.0 else 1.0
-        (self.alone if self.dialect in ("iso", "linuxcnc") else self.mode)("G21" if self.unit == 1.0 else "G20")
-        self.fed = ""
-
-    def table(self, chance: random.Random) -> None:
-        """G10: the work offset in force becomes another one."""
-        if self.plain_frame() and not self.steps and not self.tcp and self.dialect != "haas":
-            self.offset = dict(self.offset) | {a: round(self.offset[a] + chance.uniform(-5, 5), 2) for a in "XYZ"}
-            by_place = self.dialect == "linuxcnc" and not self.unsaid and chance.random() < 0.5
-            shown = self.place(self.q) if by_place else [self.offset[a] for a in "XYZ"]
-            words = " ".join(f"{a}{number(v / self.unit, 6)}" for a, v in zip("XYZ", shown, strict=False))
-            self.alone(f"G10 L{20 if by_place else 2} P{2 if self.second else 1} {words}")
-            self.unsaid = set(self.letters)
-
-    def compose(self) -> None:
-        """The frame that its parts make."""
-        self.frame = self.shift @ self.local @ self.rotation @ self.mirror
-        if self.dialect == "linuxcnc":
-            self.frame = self.rotation @ self.shift @ self.local
-
-    def plain_frame(self) -> bool:
-        """Neither turned nor mirrored."""
-        return not (self.rotation.turn - np.eye(3)).any() and not (self.mirror.turn - np.eye(3)).any()
-
-    def zero(self, chance: random.Random) -> None:
-        """G52."""
-        if self.plain_frame() and not self.steps and not self.plane:
-            self.local = shifted(*(round(chance.uniform(-20, 20), 2) for _ in range(3)))
-            if self.dialect == "linuxcnc":
-                self.shift = Frame()
-                self.unsaid |= set("XYZ")
-            x, y, z = self.local.shift / self.unit
-            self.alone(f"G52 X{number(x, 6)} Y{number(y, 6)} Z{number(z, 6)}")
-            self.compose()
-
-    def preset(self, chance: random.Random) -> None:
-        """G92 where the tool stands."""
-        if self.plain_frame() and not self.steps and not self.unsaid and not self.plane:
-            said = np.array([round(chance.uniform(-20, 20), 2) for _ in range(3)])
-            here = self.place(self.q)[:3]
-            self.shift, self.local = shifted(*(self.frame.shift + here - said)), Frame()
-            x, y, z = said / self.unit
-            self.alone(f"G92 X{number(x, 6)} Y{number(y, 6)} Z{number(z, 6)}")
-            self.compose()
-
-    def offsets(self, chance: random.Random) -> None:
-        """The other work offset."""
-        if self.plain_frame() and not self.steps and not self.tcp:
-            self.offset, self.kept, self.second = self.kept, self.offset, not self.second
-            self.mode("G55" if self.second else "G54")
-            self.unsaid = set(self.letters)
-
-    def rotate(self, chance: random.Random) -> None:
-        """G68, off or on."""
-        if self.dialect == "iso" or self.steps or self.tcp:
-            return
-        off = (self.rotation.turn - np.eye(3)).any()
-        if self.dialect == "linuxcnc":
-            if (self.shift @ self.local).shift.any():
-                return
-            askew = 90.0 if self.exact else round(chance.uniform(-180, 180), 2)
-            angle = 0.0 if off else chance.choice([90.0, 180.0, askew])
-            self.rotation = turned("Z", angle)
-            self.alone(f"G10 L2 P{2 if self.second else 1} R{angle}")
-        elif off:
-            self.rotation = Frame()
-            self.mode("G69")
-        else:
-            centre = np.array([*(round(chance.uniform(-10, 10), 2) for _ in range(2)), 0.0])
-            if (self.mirror.turn - np.eye(3)).any():
-                return
-            angle = chance.choice([90.0, -90.0, 180.0, 90.0 if self.exact else round(chance.uniform(-180, 180), 2)])
-            self.rotation = turned("Z", angle, centre)
-            x, y, _ = centre / self.unit
-            self.alone(f"G68 X{number(x, 6)} Y{number(y, 6)} R{number(angle, 3)}")
-        self.unsaid |= set("XY")
-        self.compose()
-
-    def reflect(self, chance: random.Random) -> None:
-        """A mirror image, off or on."""
-        if self.dialect not in ("fanuc", "mitsubishi") or self.steps or self.tcp:
-            return
-        if (self.rotation.turn - np.eye(3)).any():
-            return
-        if (self.mirror.turn - np.eye(3)).any():
-            self.mirror = Frame()
-            self.alone("G50.1 X0. Y0.")
-        else:
-            n, at = chance.randrange(2), round(chance.uniform(-10, 10), 2)
-            factors, by = [1.0, 1.0, 1.0], [0.0, 0.0, 0.0]
-            factors[n], by[n] = -1.0, 2 * at
-            self.mirror = shifted(*by) @ scaled(*factors)
-            self.alone(f"G51.1 {'XY'[n]}{number(at / self.unit, 6)}")
-        self.compose()
-
-    def lengths(self, chance: random.Random) -> None:
-        """A length offset, on or off."""
-        if self.tcp or self.steps:
-            return
-        self.length = 0.0 if self.length else LENGTHS[self.tool]
-        self.mode("G49" if not self.length else f"G43 H{self.tool}")
-        self.unsaid |= set("Z")
-
-    def tip(self, chance: random.Random) -> None:
-        """Tool-centre-point control, on or off."""
-        if self.dialect not in MACRO or self.steps or not self.plain_frame() or self.plane or not self.rotary:
-            return
-        if not self.tcp and self.second:
-            return
-        self.tcp, code = not self.tcp, "G49"
-        self.length = LENGTHS[self.tool] if self.tcp else 0.0
-        if self.tcp:
-            code = "G234" if self.dialect == "haas" else chance.choice(["G43.4", "G43.5"])
-        self.pointing = code == "G43.5"
-        self.alone(f"{code} H{self.tool}" if self.tcp else code)
-        self.unsaid = set(self.letters)
-
-    def may_swivel(self) -> bool:
-        if self.dialect not in ("fanuc", "mitsubishi") or not self.plain_frame() or self.second:
-            return False
-        self.absolute()
-        self.upright()
-        if not self.length:
-            self.lengths(self.style)
-        return True
-
-    def swivel(self, plane: Frame, target: Vector) -> None:
-        angles = Rotation.from_matrix(plane.turn).as_euler("ZXZ", degrees=True)
-        words = zip("XYZIJK", [*(plane.shift / self.unit), *angles], strict=True)
-        self.alone("G68.2 " + " ".join(f"{letter}{number(value, 9)}" for letter, value in words))
-        self.alone("G53.1", moves=True)
-        self.plane, self.tcp, self.rotation = True, True, plane
-        self.compose()
-
-    def unswivel(self) -> None:
-        self.absolute()
-        self.tilted(self.style)
-
-    def travel(self, target: Vector, *, rapid: bool) -> None:
-        self.go("0" if rapid else "1", target)
-
-    def tilted(self, chance: random.Random) -> None:
-        """A tilted plane, on or off."""
-        if self.dialect not in ("fanuc", "mitsubishi") or self.steps or not self.rotary:
-            return
-        if self.plane:
-            self.plane = self.tcp = False
-            self.rotation = Frame()
-            self.mode("G69")
-        elif self.tcp or not self.plain_frame() or self.second:
-            return
-        else:
-            if not self.length:
-                self.lengths(chance)
-            self.plane = self.tcp = True
-            origin = [round(chance.uniform(-10, 10), 2) for _ in range(3)]
-            angles = [round(chance.uniform(-60, 60), 1) for _ in range(3)]
-            turn = turned("Z", angles[0]) @ turned("X", angles[1]) @ turned("Z", angles[2])
-            self.rotation = shifted(*origin) @ turn
-            words = zip("XYZIJK", [*(each / self.unit for each in origin), *angles], strict=True)
-            self.alone("G68.2 " + " ".join(f"{letter}{number(value, 6)}" for letter, value in words))
-        self.unsaid = set(self.letters)
-        self.compose()
-
-    def jump(self, chance: random.Random) -> None:
-        """Blocks that the program never goes through."""
-        name = 9000 + next(self.names)
-        if self.dialect in MACRO:
-            self.alone(f"GOTO{name}")
-            self.put(f"G1 X{chance.randint(-9, 9)}. Z5. F90.")
-            self.put(f"N{name}")
-        elif self.dialect == "linuxcnc":
-            self.alone(f"o{name} if [1 EQ 0]")
-            self.put(f"G1 X{chance.randint(-9, 9)} Z5 F90")
-            self.put(f"o{name} endif")
-
-    def loop(self, chance: random.Random) -> None:
-        """A loop that is gone through once."""
-        name = next(self.names)
-        if self.dialect in MACRO and len(self.open) < 3:
-            self.alone(f"#{130 + name}=0")
-            level = 1 + sum(1 for _ in self.loops)
-            self.loops.append(level)
-            self.put(f"WHILE[#{130 + name}LT1]DO{level}")
-
-            def close() -> None:
-                self.loops.pop()
-                self.alone(f"#{130 + name}=#{130 + name}+1")
-                self.put(f"END{level}")
-
-            self.wrap(chance, close)
-        elif self.dialect == "linuxcnc":
-            self.alone(f"#<l{name}>=0")
-            self.put(f"o{9000 + name} while [#<l{name}> LT 1]")
-
-            def end() -> None:
-                self.alone(f"#<l{name}>=[#<l{name}>+1]")
-                self.put(f"o{9000 + name} endwhile")
-
-            self.wrap(chance, end)
-
-    def call(self, chance: random.Random) -> None:
-        """A subprogram that is called once."""
-        name, outer, loops = next(self.names), self.lines, self.loops
-        if self.dialect == "iso":
-            return
-        self.alone(
-            f"o{7000 + name} call"
-            if self.dialect == "linuxcnc"
-            else f"{chance.choice(['M98 P', 'G65 P'])}{7000 + name}"
-        )
-        self.lines, self.loops = [], []
-
-        def close() -> None:
-            self.alone("(end)")
-            body, self.lines, self.loops = self.lines, outer, loops
-            self.behind += self.subprogram(name, body)
-
-        self.wrap(chance, close)
-
-    def skip(self, chance: random.Random) -> None:
-        """A block with a slash."""
-        if self.setup.block_skip is True:
-            self.alone(self.comment)
-            self.put(f"/G1 X{chance.randint(-9, 9)}. Z5. F90.")
-        else:
-            self.alone(self.comment)
-            self.put("/M8")
-
     EVENTS: ClassVar[dict[str, float]] = {
         "line": 6, "rapid": 2, "arc": 3, "hole": 2, "machine_place": 0.5, "reference": 0.5, "other_tool": 0.5,
         "dwell": 0.3, "contour": 0.7, "twice": 0.7, "corner": 0.7, "tangent": 0.7, "macro": 0.7, "swivelled": 2,
-    }  # fmt: skip
-    REWRITES: ClassVar[dict[str, float]] = {
-        "increments": 3, "units": 2, "feeds": 1, "zero": 2, "preset": 1, "offsets": 1, "rotate": 2, "reflect": 1,
-        "lengths": 2, "tip": 2, "tilted": 2, "jump": 1, "loop": 1, "call": 1, "skip": 1, "table": 1,
+        "pecked": 0.7,
     }  # fmt: skip

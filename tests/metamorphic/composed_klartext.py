@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from metamorphic.composed_iso import LENGTHS
 from metamorphic.composing import SECOND, Author, Frame, Vector, scaled, shifted, turned
 from metamorphic.harness import SETUP
+from metamorphic.iso_modes import LENGTHS
 
 
 class KlartextAuthor(Author):

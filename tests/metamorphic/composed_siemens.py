@@ -8,8 +8,9 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from metamorphic.composed_iso import LENGTHS, IsoAuthor
+from metamorphic.composed_iso import IsoAuthor
 from metamorphic.composing import Frame, Vector, number, scaled, shifted, turned
+from metamorphic.iso_modes import LENGTHS
 
 
 class SiemensAuthor(IsoAuthor):

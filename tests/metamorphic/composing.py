@@ -28,7 +28,7 @@ from ncfix.text.reader import read
 
 Vector = NDArray[np.float64]
 
-PLANAR = ("arc", "hole", "contour", "corner", "tangent")
+PLANAR = ("arc", "hole", "contour", "corner", "tangent", "pecked")
 """Events in the planes of a tool that stands upright."""
 PLANES = {"Z": [0, 1], "Y": [2, 0], "X": [1, 2]}
 """The two axes of a plane by the axis across it."""

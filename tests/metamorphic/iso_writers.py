@@ -215,7 +215,7 @@ def as_vectors(rotation: np.ndarray) -> str:
 
 
 def in_plane(machine: Machine, said: Callable[[np.ndarray], str] = as_angles):
-    """The same in a tilted plane (G68.2)."""
+    """The same in a tilted plane (G68.2), with the tip led (G43.4)."""
     tilt = tilting(machine)
 
     def write(path: Route) -> str:
@@ -226,7 +226,7 @@ def in_plane(machine: Machine, said: Callable[[np.ndarray], str] = as_angles):
             lines.append(
                 f"G{min(step.code, 1)} X{p[0]:.6f} Y{p[1]:.6f} Z{p[2]:.6f} {tilt}{step.a:.3f} C{step.c:.3f} F500."
             )
-        return HEAD + "G43 H1\n" + said(rotation) + "\n".join(lines) + "\nG69\n" + TAIL
+        return HEAD + said(rotation) + "G43.4 H1\n" + "\n".join(lines) + "\nG69\nG49\n" + TAIL
 
     return write
 

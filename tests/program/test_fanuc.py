@@ -258,6 +258,8 @@ def test_the_point_of_each_word_is_kept(text: str, no_point: str, expected: str)
         ("G10L2P1X5.\nG0X1.", [[6, 0, 0]]),
         ("G10L2P1X5.\nG91G10L2P1X1.\nG90G0X1.", [[7, 0, 0]]),
         ("G10L20P3X5.\nG54.1P3\nG0X1.", [[6, 0, 0]]),
+        ("G10L20P3X5.\nG10L20P3Y2.\nG91G10L20P3Y1.\nG90G54.1P3\nG0X1.Y1.", [[6, 4, 0]]),
+        ("G43H3Z0\nG49\nG0X#4111Z0", [[0, 0, 0], [3, 0, 0]]),  # H stays in force
         ("G10L10P4R80.\nG43H4\nG0Z0.", [[0, 0, 80]]),
         ("G4X1.\nG0X2.", [[0, 0, 0], [2, 0, 0]]),
         ("T3T5M6\nG0X#4120\nT7\nX#4120", [[3, 0, 0], [7, 0, 0]]),
@@ -428,6 +430,39 @@ def test_a_way_that_is_chosen_by_p_is_not_guessed(root: Path, dialect: str, code
     assert (trace.moves.rule[-1] == Rule.CORRECT) == known
     assert known or "which way P of" in trace.moves.reasons[trace.moves.reason[-1]]
     assert ("NCF243" in [message.code for message in trace.messages]) == known
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas", "mitsubishi"])
+def test_x_y_z_stand_still_while_the_program_turns_axes_in_a_tilted_plane(root: Path, dialect: str) -> None:
+    """Unless G43.4 leads the tip. A turned block got words of X Y Z, which would have led them along."""
+    machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
+    lines = [
+        "G21G54G43H1G0X0.Y0.Z90.A0.C0.",
+        "G68.2X1.Y2.Z3.I0.J30.K0.",
+        "G0A30.",
+        "X0.Y0.Z9.",
+        *(
+            "G1A40.F100.",
+            "X1.",
+            "A30.",
+            "X1.Y1.Z9.",
+            "A30.X2.",
+            "A31.X3.",
+            "G0A30.",
+            "X4.Y4.Z9.",
+            "G43.4H1X5.Y5.Z9.A31.",
+        ),
+        "M30",
+    ]
+    setup = Setup(assume_zero=True, no_point="IS-B", tools={1: Tool(80.0)})
+    moves = follow_on(read("\n".join(lines).encode(), "part", dialect), machine, setup).trace.moves
+    passed, refused = (np.flatnonzero(moves.rule == rule) for rule in (Rule.PASS, Rule.REFUSE))
+    assert [int(block) for block in moves.block[passed]] == [2, 4, 6, 10]
+    assert [int(block) for block in moves.block[refused]] == [5, 9]
+    intent = Intent(machine, moves, State())
+    for row in passed[:3]:
+        begin, end = (intent.joints(np.array([row]), at[row : row + 1])[0] for at in (moves.start, moves.end))
+        np.testing.assert_allclose(begin[~machine.rotary], end[~machine.rotary], atol=1e-9)
 
 
 @pytest.mark.parametrize(("length", "led"), [("", 0.0), ("G43H1", 80.0), ("G43H0", 0.0)])

@@ -83,6 +83,7 @@ def test_after_skipping_the_code_before_it_is_in_force_again() -> None:
         ("G65P7L0\nG0X1.\nM30\nO7\nM99", "a call with L0"),
         ("G91G68X1.Y0R30.\nG90G0X1.Y1.", "count from in G91"),
         ("G68R30.\nG91G68R30.\nG90G0X1.Y1.", "count from in G91"),
+        ("G68X0Y0R30.\nG0X5.Y0\nG68R45.\nX1.Y1.", "names no centre turns about"),
         ("G0X1.Y1.\nG68X0Y0R30.\nX2.", "until both axes are named"),
         ("G0X1.Y1.\nG68X0Y0R30.\nX2.Y2.\nG69\nX1.", "until both axes are named"),
         ("G0X1.Y1.\nG68X0Y0R30.\nX2.Y2.\nG69\nG91X1.", "until both axes are named"),

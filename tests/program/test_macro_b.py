@@ -98,7 +98,7 @@ WORKED: dict[str, tuple[str, list[list[float]]]] = {
     ),
     "M99 P returns to a block": ("M98P1\nG0X9.\nN50G0Y1.\nM30\nO1\nG0X1.\nM99P50", [[1, 0, 0], [1, 1, 0]]),
     "a macro after every motion, until G67": (
-        "G66P1A3.\nG0X1.\nX2.\nF5\nG67\nX3.\nM30\nO1\nG0Z#1\nG0Z0.\nM99",
+        "G66P1A3.\nG0X1.\nX2.\nF5\nG91G67X1.\nM30\nO1\nG0Z#1\nG0Z0.\nM99",
         [[1, 0, 0], [1, 0, 3], [1, 0, 0], [2, 0, 0], [2, 0, 3], [2, 0, 0], [3, 0, 0]],
     ),
     "work offsets are in the unit of the program": ("G20\n#5221=1.\nG0X1.Y#5221", [[50.8, 25.4, 0]]),
@@ -168,6 +168,7 @@ def test_where_the_control_stops(text: str) -> None:
         ("IF[#1000EQ1]GOTO5\nG0X1.\nN5G0X2.", "which blocks are executed here is decided at run time"),
         ("#1=#3012\nG0X#1", "known only at run time"),
         ("#5201=1.\nG0X1.", "the program sets #5201"),
+        *((f"G0X#{word}", "known only at run time") for word in (4109, 4111, 4119, 4120)),  # F, H, S, T of before
         ("#1=0.1+0.2\nIF[#1GT0.3]GOTO5\nN5G0X1.", "which blocks are executed here is decided at run time"),
     ],
 )
@@ -176,7 +177,7 @@ def test_what_depends_on_the_machine_is_refused(text: str, reason: str) -> None:
     assert reason in reasons(found)[-1]
 
 
-@pytest.mark.parametrize(("dialect", "number"), [("fanuc", 4014), ("haas", 4014), ("mitsubishi", 4012)])
+@pytest.mark.parametrize(("dialect", "number"), [("fanuc", 4014), ("haas", 4012), ("mitsubishi", 4012)])
 def test_the_work_offset_in_force_is_in_the_group_that_it_has_with_the_maker(dialect: str, number: int) -> None:
     assert last(follow(f"G57\nG0X#{number}", dialect=dialect))[0] == 57.0
 

@@ -42,7 +42,7 @@ def test_everything_that_is_missing_is_named_at_once() -> None:
 
 
 def test_a_program_of_another_machine_is_not_followed_to_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(control, "FOLLOWED_IN_VAIN", 10)
+    monkeypatch.setattr(control, "BLOCKS_AFTER_MISSING_AXIS", 10)
     offset, axis = (
         ("NCF201", "work offset {} is used and not given"),
         "the program moves the axis A, and the machine has only X Y Z",

@@ -255,6 +255,24 @@ def test_h_alone_is_doubtful_elsewhere_until_g43(text: str) -> None:
     assert ["H without G43" in reason for reason in found[-4:]] == [True, True, False, False]
 
 
+@pytest.mark.parametrize(
+    ("text", "reason"), [("G43.1 H1 Z5.", "along the turned tool"), ("G1 G41.1 F100", "turns an axis along the path")]
+)
+def test_words_show_what_a_code_of_linuxcnc_means_elsewhere(text: str, reason: str) -> None:
+    assert reason in reasons(follow(f"G0 X1\n{text}\nX2", dialect="iso", tools=NUMBERED))[-1]
+
+
+@pytest.mark.parametrize(
+    ("dialect", "doubtful"), [("fanuc", []), ("haas", []), ("mitsubishi", [1, 3, 6]), ("iso", [1, 3, 6])]
+)
+def test_g52_is_of_all_work_offsets_or_of_one(dialect: str, doubtful: list[int]) -> None:
+    """Where both would be the same there is no doubt."""
+    text = "G52 X1.\nG0 X1.\nG55 X1.\nG52 X1.\nX1.\nG56 X1.\nG55 X1.\nG52 X0.\nX1.\nG54 X1."
+    offsets = {f"G{code}": ZERO for code in (54, 55, 56)}
+    found = reasons(follow(text, axes="X", dialect=dialect, work_offsets=offsets))
+    assert [n for n, reason in enumerate(found) if "(G52)" in reason] == doubtful
+
+
 @pytest.mark.parametrize("dialect", ["iso", "fanuc", "mitsubishi"])
 def test_g52_in_g91_may_be_added_to_the_shift_in_force(dialect: str) -> None:
     setup: dict[str, Any] = {"dialect": dialect, "no_point": "calculator"}

@@ -156,7 +156,7 @@ def set_offset(control: RS274Control, block: Block) -> None:
 def set_extended(control: RS274Control, block: Block) -> None:
     """L20 Pn: the words are the offset of G54.1 Pn, or are added to it in G91."""
     name = f"G54.1P{whole(block.get('P'), 'P of G10')}"
-    given = dict(control.setup.work_offsets.get(name, {}))
+    given = dict(control.extended.get(name, control.setup.work_offsets.get(name, {})))
     if control.modal.incremental and not given:
         control.knowledge.work_offset(name)
     for index in words_of(block):

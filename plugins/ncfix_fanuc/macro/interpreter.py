@@ -153,7 +153,11 @@ class MacroInterpreter(RS274Interpreter):
         self.control.entering = False
         plan = self.without_vacant(plan)
         codes = plan.codes
-        if codes is not None and codes.g.get(MACRO) and plan.fault is None:
+        macro = codes.g.get(MACRO) if codes is not None and plan.fault is None else None
+        if macro == G67:
+            self.modal_calls = self.modal_calls[:-1]
+            plan = self.without(plan, [word.span for word in plan.template.words if self.calls(word)])
+        elif macro and codes is not None:
             self.macro(plan, codes, self.before_call(plan, index))
             return False
         refusal = self.control.refusal
@@ -176,8 +180,10 @@ class MacroInterpreter(RS274Interpreter):
             return plan
         spans = [span for _, function, span in plan.computed if is_vacant(function(self.control))]
         spans += [word.span for word, function in plan.code_words if is_vacant(function(self.control))]
-        if not spans:
-            return plan
+        return self.without(plan, spans) if spans else plan
+
+    def without(self, plan: RS274Plan, spans: list[Span]) -> RS274Plan:
+        """The plan without some of its words."""
         key = id(plan), frozenset(spans)
         if key not in self.reduced:
             items = plan.template.items
@@ -260,11 +266,25 @@ class MacroInterpreter(RS274Interpreter):
         before = self.control.builder.count
         if tilt.turns_tables(self.control, block):
             self.control.suspend(tilt.DYNAMIC, tilt.TABLES_MOVED)
-        if self.control.vectors:
+        if MACHINE not in codes.g.values() and tilt.turns_in_plane(self.control, block):
+            self.in_plane(block, codes, motion)
+        elif self.control.vectors:
             self.by_vector(block, codes, motion)
         else:
             super().move(block, codes, motion)
         self.moved = self.control.builder.count > before
+
+    def in_plane(self, block: Block, codes: Codes, motion: int) -> None:
+        """A block that turns rotary axes in a tilted plane; where others beside them lead is not known."""
+        control = self.control
+        if motion in tilt.STRAIGHT and not block.axes & ~mask_of(control.turning):
+            tilt.turn_in_plane(control, block, motion)
+        else:
+            before, control.refusal = control.refusal, control.refusal or tilt.MIXED
+            super().move(block, codes, motion)
+            control.refusal = before
+            control.lose(tilt.SPATIAL, tilt.AFTER_MIXED)
+        tilt.look_square(control)
 
     def calls_behind(self, block: Block, codes: Codes) -> bool:
         """See `RS274Interpreter`; G66 calls a macro behind every motion."""
@@ -363,14 +383,10 @@ class MacroInterpreter(RS274Interpreter):
         return self.control.rules.g_groups.get(round(10 * word.value.value)) == MACRO
 
     def macro(self, plan: RS274Plan, codes: Codes, before: str) -> None:
-        """G65 calls a macro once, G66 after every following motion, G67 ends that; `before`: for a flat program."""
+        """G65 calls a macro once, G66 after every following motion; `before`: for a flat program."""
         code = codes.g[MACRO]
         if self.watcher and before and code != G65:
             self.watcher.write(before)
-        if code == G67:
-            if self.modal_calls:
-                self.modal_calls.pop()
-            return
         values = {word.address: self.argument(word) for word in plan.template.words if word.address not in "GMN"}
         name = self.named_program()
         label = name or str(whole(nominal(values.get("P", 0.0)), f"P of G{code // 10}"))

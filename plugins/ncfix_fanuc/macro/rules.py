@@ -140,6 +140,7 @@ FANUC = Rules(
     },
     cycles=ALL_CYCLES,
     radius_first=True,
+    one_local=True,
     takes=frozenset({40, 100, 270, 290, 531, 536, 650, 660, 661, 670, 921}),
     system=is_system,
     lasting=is_lasting,
@@ -184,6 +185,7 @@ HAAS = replace(
     repeats="L",
     radius_first=False,
     adds_rotations=True,
+    offset_group=12,
 )
 HAAS = groups.with_m_code(HAAS, HAAS_JUMP, (Refuse(BY_INPUT),))
 """Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), mills texts and pockets on its own, pecks
@@ -201,6 +203,7 @@ MITSUBISHI = replace(
     },
     takes=FANUC.takes | set(MITSUBISHI_MADE),
     scales_named=True,
+    one_local=False,
     offset_group=12,
 )
 """Mitsubishi also mills circular pockets and drills patterns on its own, and numbers modal groups otherwise."""

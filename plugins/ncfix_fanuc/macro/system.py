@@ -65,7 +65,10 @@ def offset(control: MacroControl, number: int) -> Value:
 
 
 def modes(control: MacroControl) -> dict[int, Getter]:
-    """Variables of the codes and words in force: before the block (4001), and of the running block (4201, 4301)."""
+    """Variables of the codes and words in force: before the block (4001), and of the running block (4201, 4301).
+
+    Words that the program has not given are those of the program before, or the operator's.
+    """
     tools = control.tools
     state: dict[int, Getter] = {
         1: lambda: control.modal.motion / 10,
@@ -77,10 +80,10 @@ def modes(control: MacroControl) -> dict[int, Getter]:
         8: lambda: control.modal.tool_code / 10,
         10: lambda: 99.0 if control.modal.retract_to_r else 98.0,
         control.rules.offset_group: lambda: float(SYSTEM_CODES.get(control.modal.system, 54)),
-        109: lambda: control.feed_in_force,
-        111: lambda: float(tools.offset or 0),
-        119: lambda: control.modal.speed,
-        120: lambda: Unknown("T", tools.selected) if tools.doubtful else float(tools.selected),
+        109: lambda: control.feed_in_force or Unknown("F"),
+        111: lambda: Unknown("H") if control.length_number is None else float(control.length_number),
+        119: lambda: control.modal.speed or Unknown("S"),
+        120: lambda: Unknown("T", tools.selected) if tools.doubtful or not tools.selected else float(tools.selected),
     }
     return {base + number: getter for base in (4000, 4200, 4300) for number, getter in state.items()}
 

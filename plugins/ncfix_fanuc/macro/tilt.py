@@ -1,7 +1,8 @@
 """Tilted working planes (G68.2 begins one, G53.1 turns the tool square to it, G69 ends it), and tool vectors (G43.5).
 
-In a tilted plane, X Y Z are those of the tool tip in a frame that turns with the workpiece, whatever the rotary axes
-do: the control computes the linear axes from the tip, as under tool-centre-point control.
+In a tilted plane, X Y Z are those of the tool tip in a frame fixed to the workpiece, to which the tool stands square.
+The control computes the linear axes from the tip; while the program turns rotary axes they stand still, unless G43.4 is
+in force.
 
 The dynamic work offset of Haas (G254, G255) turns the work offset with the tables, by their present angles. X Y Z are
 then those of the tip along the machine's axes, from the turned origin of the workpiece. That is the frame of a tilted
@@ -46,10 +47,12 @@ from ncfix.control.posture import Postures, WayRules, normal_of
 from ncfix.control.tcp import switch
 from ncfix_fanuc.macro.control import COMPONENTS, MacroControl
 from ncfix_iso.rs274.control import Block
+from ncfix_iso.rs274.motion import words_destination
 from ncfix_iso.rs274.parameters import whole
 from ncfix_iso.rs274.systems import ENDS, rotate_system, turned_back, unfollowed
 
 STRAIGHT, ARCS = (0, 10), (20, 30)
+SPATIAL = (X, Y, Z)
 BAD_VECTOR = "NCF219"
 INCLINED = "the tool leans away from its vectors (Q of G43.5), which ncfix does not follow"
 BY_AXES = "a word of a rotary axis while the direction of the tool is given by I J K (G43.5)"
@@ -133,6 +136,14 @@ ALIGNMENTS = {
     code: Passing(Pass.ALIGNMENT, f"tool axis alignment ({name})") for code, name in ((531, "G53.1"), (536, "G53.6"))
 }
 ABOUT_TIP = 536
+ROTARY_ALONE = Passing(
+    Pass.ROTARY_ALONE, "rotary axes are positioned in a tilted plane; the tip is corrected where it moves next"
+)
+NO_TURN = 1e-9
+"""rad; an axis that is told to go where it stands does not turn."""
+MIXED = "rotary axes move in a tilted plane together with others, without control of the tip (G43.4)"
+AFTER_MIXED = "where the axis {} stands after rotary and other axes have moved together in a tilted plane is not known"
+ASKEW = "the program has turned rotary axes in a tilted plane, and the tool does not stand square to it"
 DYNAMIC_ON, DYNAMIC_OFF = 2540, 2550
 DYNAMIC = "dynamic work offset"
 OFFSET_NOT_SOLVED = "how the tables stand where G254 comes into force, or what is in force besides it, is not followed"
@@ -238,6 +249,7 @@ def end(control: MacroControl) -> None:
     """End the tilted plane, if there is one."""
     if not control.tilted:
         return
+    control.resume(ASKEW)
     control.tilted, control.frame_unknown = False, None
     control.frames = replace(control.frames, plane=WORLD, rotation=WORLD)
     on = control.setup.tcp or control.tip_control
@@ -255,6 +267,7 @@ def align(control: MacroControl, block: Block, code: int) -> None:
     In G53.1 the linear axes stand still; in G53.6 they follow, so that the tip stays at its place on the workpiece. On
     some controls P chooses among several ways (Mitsubishi, Mazak); then the positions of the axes are not known.
     """
+    control.resume(ASKEW)
     control.use_start_positions(control.turning)
     found = control.postures(normal_of(control.rotation))
     target, lost = control.position[:], set[int]()
@@ -296,6 +309,42 @@ def is_moved_otherwise(control: MacroControl, block: Block) -> bool:
     """Whether G53.6 moves the tip: along the tool (R), or because no tool length, or another one, is in force."""
     other = "H" in block.values and whole(block.values["H"], "H") != control.tools.offset
     return bool(block.get("R")) or not control.length_code or other
+
+
+# -- rotary words in a tilted plane ------------------------------------------------------------------------------------
+
+
+def turns_in_plane(control: MacroControl, block: Block) -> bool:
+    """Whether a block turns rotary axes in a tilted plane without control of the tip: X Y Z do not follow."""
+    led = control.tip_control or control.setup.tcp or control.dynamic
+    named = [index for index in control.turning if block.axes >> index & 1]
+    if led or not control.tilted or not named:
+        return False
+    end = words_destination(control, block)
+    known = not {*named} & (end.unknown.keys() | control.unknown.keys())
+    return not (known and all(abs(end.target[index] - control.position[index]) < NO_TURN for index in named))
+
+
+def turn_in_plane(control: MacroControl, block: Block, motion: int) -> None:
+    """Such a block, straight and without other axes."""
+    control.modal.motion = control.modal.straight = motion
+    end, turning = words_destination(control, block), {*control.turning}
+    switch(control, control.tools.vector, False, control.tools.offset)
+    control.refresh()
+    target = [value if index in turning else control.position[index] for index, value in enumerate(end.target)]
+    unknown = {index: why for index, why in end.unknown.items() if index in turning}
+    unknown |= {index: why for index, why in control.unknown.items() if index not in turning}
+    kind = MotionKind.FEED if motion else MotionKind.RAPID
+    control.make(Motion(kind, block.axes, MotionEnd(target, unknown), motion, passing=ROTARY_ALONE))
+    switch(control, control.tools.vector, True, control.tools.offset)
+    control.refresh()
+
+
+def look_square(control: MacroControl) -> None:
+    """Behind a turn by the program: while the tool does not stand square to the plane motions are refused."""
+    control.resume(ASKEW)
+    if control.square_to(control.rotation) is False:
+        control.suspend(ASKEW, ASKEW, followed=True)
 
 
 # -- G254 and G255 of Haas ---------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from typing import Any
 from ncfix.control import control as shared
 from ncfix.control.coordinates import INCH, LETTERS
 from ncfix.control.expressions import Evaluate, Unknown, Value, nominal
+from ncfix.control.frames import Affine
 from ncfix.control.setup import Run
 from ncfix.control.state import Saved
 from ncfix.text.dialect import Dialect
@@ -73,6 +74,7 @@ class RS274Control(shared.ProgramControl):
     rules      the dialect's meaning of codes
     parameters numbered and named parameters
     extended   additional work offsets (G54.1) set by the program; `extended_name`: the one in force
+    locals     shift that G52 has set, by the work offset then in force
     tip_control  whether tool-centre-point control (G43.4) is on, in a tilted plane or not
     unnamed    axes of the plane that the program has not named since a rotation was switched on or off
     set_length the dialect's step for G43
@@ -92,6 +94,7 @@ class RS274Control(shared.ProgramControl):
         self.saved: list[Saved | None] = [None]
         self.extended: dict[str, Mapping[str, float]] = {}
         self.extended_name = ""
+        self.locals: dict[int | str, Affine] = {}
         self.tip_control = False
         self.unnamed: frozenset[int] = frozenset()
         self.left_out = False

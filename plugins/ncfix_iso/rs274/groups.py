@@ -178,6 +178,7 @@ class Rules:
     din_units   G70 and G71 alone are inches and millimetres, as in DIN 66025
     adds_rotations  in G91 the angle of G68 is added to the one in force
     scales_named  scaling (G51) acts only on the axes named in its block
+    one_local   G52 is one shift for all work offsets; otherwise each may have its own
     offset_group  group number of the work offset codes: 14 where #4014 contains the one in force
     system      number -> whether this parameter belongs to the control, so that assigning to it has an effect
     lasting     number -> whether this parameter keeps its value after the program
@@ -200,6 +201,7 @@ class Rules:
     din_units: bool = False
     adds_rotations: bool = False
     scales_named: bool = False
+    one_local: bool = False
     offset_group: int = 14
     system: Callable[[int], bool] = lambda number: 5161 <= number <= 5390
     lasting: Callable[[int], bool] = lambda number: False

@@ -73,8 +73,13 @@ NO_REGISTER = -1
 
 
 def compensation(control: RS274Control, block: Block, code: int) -> None:
-    """G40 to G42.1: the programmed contour is followed, which the control offsets."""
+    """G40 to G42.1: the programmed contour is followed, which the control offsets.
+
+    G41.1 without D turns an axis along the path on other controls.
+    """
     side = 0 if code == 400 else code // 10
+    if code % 10 and "D" not in block.values and not control.rules.strict:
+        control.refuse_rest(f"G{code / 10:g} without D turns an axis along the path on some controls")
     if control.rules.strict and side:
         if control.modal.compensated:
             raise Fault(BAD_SETTING, "cutter compensation is on already")
@@ -172,8 +177,11 @@ def tool_offset(control: RS274Control, block: Block, code: int) -> None:
     """G43, G43.1, G43.2, G43.4, G43.5, G44 and G49.
 
     An offset of zero length (H0, G43.1 Z0) counts as none: the tool length is then that of the tool in the spindle. An
-    offset whose length is missing and taken as zero counts as one.
+    offset whose length is missing and taken as zero counts as one. G43.1 with H is a length along the turned tool on
+    other controls.
     """
+    if code == 431 and "H" in block.values and not control.rules.strict:
+        control.refuse_rest("G43.1 with H is a length along the turned tool on some controls")
     tool, number, lacking = offset_of(control, block, code)
     if control.resume(BY_H_ALONE):
         control.lose((X, Y, Z) if control.tcp else (Z,), AFTER_H_ALONE)

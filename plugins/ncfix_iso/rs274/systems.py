@@ -22,6 +22,7 @@ from ncfix.control.coordinates import (
     X,
     Y,
     about,
+    dot,
     mask_of,
     product,
     rotated,
@@ -45,6 +46,7 @@ BAD_G10 = "NCF222"
 NO_PRESET = "G92.1 that names no axis, another value than zero, or stands under a tool offset is not followed"
 COUNTED_ON = "what G92 counts from in G91 differs from control to control"
 ON_TOP = "whether a shift (G52) is added to the one in force in G91 differs from control to control"
+WHOSE_SHIFT = "whether a shift (G52) of the axis {} is one of all work offsets differs from control to control"
 TURNED_WITH_SHIFT = "where {} stands after a rotation while G92 is active differs from control to control"
 TURNED = "turned"
 MOVED_WHILE_TURNED = "what {} does while coordinates are turned, mirrored or tilted differs from control to control"
@@ -74,6 +76,9 @@ ENDS = {
     2690: "feature",
 }
 """Codes that end these modes."""
+
+SAME_PLACE = 1e-6
+"""mm; places that are less apart are one."""
 
 ROTATED = "rotation"
 """Mode that suspends motions while a rotation in the plane is uncertain, until G69."""
@@ -157,6 +162,20 @@ def select_system(control: RS274Control, block: Block, code: int) -> None:
     take_system(control, block, code)
     if (control.modal.system, control.extended_name) != before:
         moved_while_turned(control, f"G{code / 10:g}")
+        if not (control.rules.strict or control.rules.one_local):
+            doubt_local(control)
+
+
+def doubt_local(control: RS274Control) -> None:
+    """Behind another work offset: is G52 a shift of all of them, or has each its own? Where that matters is not known.
+
+    Sources: Fanuc has one for all; Mitsubishi M700V programming manual, "Local coordinate system setting".
+    """
+    local, kept = control.frames.local, control.locals.get(control.modal.system or control.extended_name, WORLD)
+    unknown = {index: why for index, why in local.unknown.items() if why != WHOSE_SHIFT}
+    unknown |= {i: WHOSE_SHIFT for i in control.axis_indices if local.shift[i] != kept.shift[i]}
+    control.frames = replace(control.frames, local=replace(local, unknown=unknown))
+    compose(control)
 
 
 def take_system(control: RS274Control, block: Block, code: int) -> None:
@@ -375,7 +394,9 @@ def set_local(control: RS274Control, block: Block, *, cancelled: bool) -> None:
         at_run_time = LETTERS[index] in block.unknown and not cancelled and not control.probes_nominally
         if at_run_time and index in control.axis_indices:
             unknown[index] = RUNTIME_OFFSET
-    control.frames = replace(control.frames, local=Affine(tuple(local), unknown=unknown))
+    local_frame = Affine(tuple(local), unknown=unknown)
+    control.locals[control.modal.system or control.extended_name] = local_frame
+    control.frames = replace(control.frames, local=local_frame)
     compose(control)
 
 
@@ -422,9 +443,14 @@ def uncertain(control: RS274Control, block: Block) -> str:
     if control.modal.incremental and (centred or again):
         return "what the words of a rotation (G68) count from in G91 differs from control to control"
     pair = control.modal.plane.pair
-    control.use_start_positions([index for index in pair if LETTERS[index] not in block.values])
+    about_here = [index for index in pair if LETTERS[index] not in block.values]
+    control.use_start_positions(about_here)
     if block.unknown or control.unknown.keys() & {*pair}:
         return "the centre or angle of a rotation (G68) is known only at run time"
+    here, turned = control.program_position(), control.frames.rotation
+    before = [turned.shift[index] + dot(turned.rotation[index], here[:3]) for index in about_here]
+    if any(abs(place - here[index]) > SAME_PLACE for place, index in zip(before, about_here, strict=True)):
+        return "what a rotation (G68) that names no centre turns about while another is in force is not certain"
     return ""
 
 
@@ -444,8 +470,9 @@ def turn_about_point(control: RS274Control, block: Block, before: Rotation) -> N
 def unfollowed(control: RS274Control, block: Block, code: int) -> None:
     """Scaling, mirroring, polar coordinates and tilted planes: motions are refused while they are in force."""
     if code in UNFOLLOWED:
-        if code == 510 and not block.axes and not block.values.keys() & {"I", "J", "K", "P"}:
-            return
+        alone = not block.axes and not block.values.keys() & {"I", "J", "K", "P"}
+        if code == 510 and alone and control.rules.din_units:
+            return  # in DIN/ISO of a TNC the next tool; elsewhere by a factor of the control
         key, words = UNFOLLOWED[code]
         control.suspend(key, f"{words} is in force, which ncfix does not follow")
     elif control.resume(ENDS[code]):

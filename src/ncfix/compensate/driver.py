@@ -58,6 +58,7 @@ from ncfix.compensate.plan.offset import is_offset
 from ncfix.compensate.report import FixReport, Tally, in_lines
 from ncfix.compensate.solve import AcceptedPlan, Planning, PrecedingMotion, WrittenPlan, increments
 from ncfix.compensate.workers import OpenFiles, Read, WorkShare, worker_pool
+from ncfix.control.interpreter import NEVER
 from ncfix.control.moves import Moves, Trace
 from ncfix.control.setup import Setup
 from ncfix.control.trace import NotInPartsError
@@ -306,12 +307,13 @@ def fix_flat(
     """Like `fix_program`; if that refuses motions, the program is written out flat and the flat program is corrected.
 
     A program that can be corrected as it is keeps its loops and subprograms. The flat program is used only if fewer
-    lines are refused in it. A program in which nothing moves stays as it is, because flat it would lose all its blocks;
-    so does one that must be right in several positions of block delete, because a flat program has the numbers of one
-    position only (NCF447). The report gives lines of the original. Raises what `fix_program` and `flatten` raise.
+    lines are refused in it. A program of which nothing is corrected stays as it is, because flat it would lose all its
+    blocks; so does one that must be right in several positions of block delete, because a flat program has the numbers
+    of one position only (NCF447). The report gives lines of the original. Raises what `fix_program` and `flatten`
+    raise.
     """
     fixed = fix_program(program, machine, setup, options, resolve)
-    if not (fixed.report.refused and fixed.report.moves):
+    if all(each.code == NEVER for each in fixed.report.refused):
         return fixed
     if len(fixed.report.block_delete) > 1:
         text = "not written out flat: its numbers would be those of one position of block delete"
@@ -325,7 +327,7 @@ def fix_flat(
     again = fix_program(flat.program, machine, setup, options, resolve)
     if {each.line for each in fixed.report.refused} <= {flat.lines[each.line - 1] for each in again.report.refused}:
         return fixed
-    report = in_lines(again.report, flat, program)
+    report = in_lines(again.report, flat, program, fixed.report.warnings)
     return replace(again, changed=True, report=report, lines=tuple(flat.lines))
 
 

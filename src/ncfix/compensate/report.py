@@ -311,9 +311,10 @@ class Tally:
         """The report. `messages`: the messages from following the program."""
         figures = options.figures
         after = self.after.as_dict(self.way, self.samples) | {"where": self.after.line}
-        still = [] if self.moves else [each for each in messages if each.code == NEVER]
-        uncorrected = [  # if nothing in it moves, what was meant stays uncorrected
-            Refusal(each.place.line if each.place else 0, each.code, f"{each.text}; nothing else in it moves")
+        alone = not (self.compensated or self.refused)
+        still = [each for each in messages if alone and each.code == NEVER]
+        uncorrected = [  # if nothing else is corrected, what was meant stays uncorrected
+            Refusal(each.place.line if each.place else 0, each.code, f"{each.text}; nothing else in it is corrected")
             for each in still
         ]
         report = FixReport(
@@ -356,8 +357,12 @@ def refusals(program: Program, account: Account) -> list[Refusal]:
     ]
 
 
-def in_lines(report: FixReport, flat: Flat, program: Program) -> FixReport:
-    """The report of a flat program, with the lines of the original."""
+LEFT_OUT = "the flat program does not have them: correct another program in a file of its own"
+"""Hint about blocks that the program never goes through."""
+
+
+def in_lines(report: FixReport, flat: Flat, program: Program, said: Sequence[Message]) -> FixReport:
+    """The report of a flat program, with the lines of the original, and of what `said` of that the blocks left out."""
 
     def with_lines(message: Message) -> Message:
         place = message.place
@@ -371,4 +376,6 @@ def in_lines(report: FixReport, flat: Flat, program: Program) -> FixReport:
     after = dict(report.error_after_um)
     if after.get("where"):
         after["where"] = flat.lines[int(after["where"] or 1) - 1]
-    return replace(report, refused=refused, error_after_um=after, warnings=(note, *map(with_lines, report.warnings)))
+    left_out = (replace(each, hint=LEFT_OUT) for each in said if each.code == NEVER)
+    warnings = note, *map(with_lines, report.warnings), *left_out
+    return replace(report, refused=refused, error_after_um=after, warnings=warnings)

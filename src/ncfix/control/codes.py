@@ -286,8 +286,8 @@ CODES: dict[str, Code] = {
         "The file has blocks that name axes, and the program never goes through them: it ends before (M30, M2, %, END "
         "PGM), or jumps over them. They are another program in the same file, a subprogram that nothing calls, a "
         "branch that is not taken with these values, or what an editor has left there. What is corrected is the first "
-        "program, where it goes, and what it calls. If that moves nothing, as where a text before the first % is taken "
-        "for the program, it is refused.",
+        "program, where it goes, and what it calls. If nothing of that is corrected, as where a text before the first "
+        "% is taken for the program, it is refused.",
         "Correct each program in a file of its own; delete what is left over. Where a value in the program chooses a "
         "branch, correct the original anew after the value has been changed.",
     ),
