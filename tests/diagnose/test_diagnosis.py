@@ -278,6 +278,8 @@ def test_files_that_contradict_each_other_are_refused(known: Machine) -> None:
     worse = np.where(np.arange(80) % 2, 0.03, -0.03)
     second = replace(first.with_columns({"dy": first.columns["dy"] + worse}), path="second.csv")
     refused("NCF656", [first, second], known)
+    changed = diagnose([first, second], known, since=True)  # whoever measures again goes to the same poses
+    assert changed.case.since
 
 
 def test_one_side_only_is_said(known: Machine) -> None:

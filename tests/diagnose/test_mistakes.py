@@ -17,7 +17,7 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Polynomial
 from ncfix.machine.piecewise import PiecewiseLinear
 from ncfix.measure.instruments import Faults, simulate
-from ncfix.measure.measurement import Measurement
+from ncfix.measure.measurement import CENTRE, Measurement
 
 Changed = tuple[Measurement, Machine]
 
@@ -200,6 +200,33 @@ def test_a_unit_of_readings(kind: str, factor: float, beside: int, known: Machin
     assert ("part0.csv" in wrong.title) == bool(beside)
     for name in READINGS[kind]:
         assert wrong.measurements[0].columns[name] == pytest.approx(files[0].columns[name], rel=1e-12)
+
+
+LENGTHS = ("length", "nominal", "radius")
+PLACES: dict[str, Callable[[Measurement], Measurement]] = {
+    "inch": lambda d: d.times("XYZ", 1 / 25.4),
+    "inch: positions and lengths": lambda d: d.times((*"XYZ", *LENGTHS), 1 / 25.4),
+    "metre: positions and lengths": lambda d: d.times((*"XYZ", *LENGTHS), 1e-3),
+    "swapped X Y": lambda d: d.exchanged("X", "Y") or d,
+    "axis sign Z": lambda d: d.times("Z", -1.0),
+    "axis sign X": lambda d: d.times("X", -1.0, CENTRE),
+}
+MISPLACED = [(kind, change) for kind in ("gauge", "bar", "probe") for change in PLACES]
+MISPLACED = [pair for pair in MISPLACED if pair[0] != "probe" or "lengths" not in pair[1]]
+
+
+@pytest.mark.parametrize(("kind", "change"), MISPLACED if FULL else MISPLACED[::3])
+def test_positions_in_every_column_that_holds_them(kind: str, change: str, known: Machine) -> None:
+    """Both ends of a length, the centre of a bar, what a probe reads: X is X whatever its column is called."""
+    right = simulate(plan(known, kind, 80, 3), known, Faults(2.0), 3)
+    mistaken = PLACES[change](right)
+    wrong = find([mistaken], known)
+    assert wrong is not None
+    assert wrong.sure
+    assert wrong.name == change.split(":")[0]
+    assert change.split(": ")[-1] in wrong.title or ":" not in change
+    for name, values in right.columns.items():
+        assert wrong.measurements[0].columns[name] == pytest.approx(values, rel=1e-12)
 
 
 def test_a_sign_of_values_that_constants_could_explain_as_well(data: Measurement, known: Machine) -> None:

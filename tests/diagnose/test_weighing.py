@@ -27,7 +27,17 @@ from ncfix.diagnosis.evidence import (
 from ncfix.diagnosis.forms import unnamed_alternatives
 from ncfix.diagnosis.noise import estimated_background, everything_covariance
 from ncfix.diagnosis.residual_data import residual_data
-from ncfix.diagnosis.selection import TOLD_APART, Selected, likeliest, select, untold, with_alternatives
+from ncfix.diagnosis.selection import (
+    TOLD_APART,
+    TRIED,
+    WITHIN,
+    Selected,
+    lead_needed,
+    likeliest,
+    select,
+    untold,
+    with_alternatives,
+)
 from ncfix.measure.instruments import Faults, simulate
 from ncfix.measure.measurement import Array
 
@@ -111,6 +121,20 @@ def test_what_only_comes_with_an_effect_stands_in_no_names_place(five: World) ->
         chosen = Selected({name: Member(evidence.forms[name][0], 12.0)}, {name: 100.0}, {name: {}})
         plays = [each for each in evidence.names if each.startswith("angular play")]
         assert min(untold(Comparison(evidence), chosen, name, play) for play in plays) > TOLD_APART
+
+
+def test_what_data_tell_counts_in_full_and_what_is_assumed_a_third() -> None:
+    assert [lead_needed(told) for told in (-1.0, 0.0, 4.0, TOLD_APART)] == [9.0, 9.0, 11.0, 3.0]
+
+
+def test_all_names_that_come_near_one_are_weighed_in_its_place(evidence: Evidence) -> None:
+    """Not only the likeliest few: in noise alone all are near each other."""
+    scale = Comparison(evidence)
+    odds = scale.candidate_odds({})
+    first = {name: odds.of(evidence.forms[name]) for name in scale.names}
+    near = {name for name, value in first.items() if value > first["EXX"] - WITHIN}
+    assert len(near) > TRIED
+    assert near <= set(likeliest(scale, scale.names, {}, beside="EXX"))
 
 
 def test_members_that_are_free_are_no_names(evidence: Evidence) -> None:

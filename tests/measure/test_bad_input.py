@@ -61,6 +61,7 @@ REFUSED = {
     "a gap": (lambda text: cell(text, 3, "dy", lambda _: ""), "NCF607", "column 'dy' is empty in this row"),
     "not a number": (lambda text: cell(text, 3, "dy", lambda _: "n/a"), "NCF608", "is not a number"),
     "a decimal comma": (lambda text: cell(text, 3, "dy", lambda value: value.replace(".", ",")), "NCF606", "cells"),
+    "a reading marked by nines": (lambda text: cell(text, 3, "dy", lambda _: "-9999"), "NCF612", "not read?"),
     "an axis that is not there": (lambda text: text.replace(",B,", ",A,"), "NCF610", "no axis A, only C B X Z Y"),
     "time going backwards": (lambda text: cell(text, 9, "time_s", lambda _: "5"), "NCF611", "5 s after 240 s"),
 }

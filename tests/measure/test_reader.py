@@ -116,6 +116,28 @@ def test_a_fault_is_named_with_its_place(name):
     assert expected in faults(text)
 
 
+SAID = {
+    "units in names": (HEAD + "X [mm];Y/mm;dx (\u00b5m)\n1,5;2;0,001\n", "call it dx, without a unit"),
+    "a line of units": (HEAD + "X,Y,dx\nmm,mm,um\n1,2,0.001\n", "leave out the line with units"),
+    "units in cells": (HEAD + "X,Y,dx\n1 mm,2,0.001\n", "a cell has the number alone"),
+    "a number in groups": (HEAD + "X;Y;dx\n1.000,5;2;0,001\n", "without marks of thousands"),
+    "groups by blanks": (HEAD + "X;Y;dx\n1\u00a0000,5;2;0,001\n", "without marks of thousands"),
+    "names once more": (HEAD + "X,Y,dx\n1,2,0.001\nX,Y,dx\n2,2,0.001\n", "the columns are named once"),
+    "a minus of a typesetter": (HEAD + "X,Y,dx\n1,\u22122,0.001\n", "a minus is written -"),
+    "a dash for no reading": (HEAD + "X,Y,dx\n1,2,-\n", "leave out a row"),
+    "no number for no reading": (HEAD + "X,Y,dx\n1,2,NaN\n", "leave out a row"),
+    "noise with a comma": (GOOD.replace("1.5", "1,5"), "a decimal point, not a comma"),
+}
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_what_instruments_write_is_refused_with_what_helps(name):
+    text, said = SAID[name]
+    with pytest.raises(ConfigError) as caught:
+        reads(text.encode(), THREE)
+    assert said in " ".join(message.hint for message in caught.value.messages)
+
+
 def test_the_line_is_shown_with_what_cannot_be_in_it():
     with pytest.raises(ConfigError) as caught:
         reads(GOOD.replace("-20.0,1,", "-20.0,0.5,").encode(), THREE, "m.csv")

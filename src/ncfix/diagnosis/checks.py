@@ -96,20 +96,21 @@ def enough(data: ResidualData) -> None:
         raise UsageError.of("NCF650", text, hint="measure more poses")
 
 
-def agreeing(data: ResidualData, residual: Array, sigma: float) -> None:
-    """Refuse files that contradict each other at common poses. Raises `UsageError` NCF656.
+def agreeing(data: ResidualData, residual: Array, sigma: float, since: int = 0) -> None:
+    """Refuse files of one date that contradict each other at common poses. Raises `UsageError` NCF656.
 
     residual  (m,) um; sigma: noise of a usual value, um
+    since     index of the first file of the later date: what changed is no contradiction
     """
     if len(data.measurements) < 2:
         return
     apart, pairs = 0.0, 0
     q = np.round(data.q, 6)
-    places: dict[tuple[bytes, float, str], list[tuple[int, float]]] = {}
+    places: dict[tuple[bytes, float, str, bool], list[tuple[int, float]]] = {}
     length = data.column("tool_length")
     for value, row, name in zip(residual / data.relative, data.row, data.names, strict=True):
         if row >= 0:
-            key = (q[row].tobytes(), float(length[row]), name)
+            key = (q[row].tobytes(), float(length[row]), name, data.file[row] < since)
             places.setdefault(key, []).append((int(data.file[row]), float(value)))
     for found in places.values():
         by_file = {file: float(np.mean([v for f, v in found if f == file])) for file, _ in found}

@@ -87,6 +87,7 @@ class Case:
     unheard_of  names to be left out that the catalogue does not have
     invisible   (name, visible share of its squares) of candidates that the data cannot show
     outlying    (rows,) mask of the outliers
+    since       index of the first file of the later date; 0: all are of one date
     """
 
     data: ResidualData
@@ -94,6 +95,7 @@ class Case:
     unheard_of: tuple[str, ...]
     invisible: tuple[tuple[str, float], ...]
     outlying: Mask
+    since: int = 0
 
     @property
     def kept(self) -> Mask:
@@ -114,7 +116,7 @@ class Diagnosis:
     p_lack, p_left  probability of so large residuals by chance, before and after; None if the noise is not known
     likelihood     log likelihood of the values given the file with all findings, less their prices
     named_odds     log odds of all names together
-    steady         names of effects that two dates have in common; `dates`: changes between dates were sought
+    steady         names of effects that two dates have in common (`case.since`)
     clustering     Moran's I of the residuals, before and after
     constants      the verdict on the constants of the machine file; `gap.before` has them corrected
     findable       name -> size, um rms, from which an effect would be found in these data; inf: never
@@ -140,7 +142,6 @@ class Diagnosis:
     likelihood: float = 0.0
     named_odds: float = 0.0
     steady: tuple[str, ...] = ()
-    dates: bool = False
 
     @property
     def data(self) -> ResidualData:
@@ -228,7 +229,7 @@ def concluded(case: Case, scale: Comparison, selected: Selected) -> Diagnosis:
     share = evidence.share(every)
     joint = fitted(evidence, told, share)
     sigma = _sigma(evidence, every, share)
-    checks.agreeing(data, joint.before, sigma)
+    checks.agreeing(data, joint.before, sigma, case.since)
     floor = noise_floor(data, evidence.background, sigma, keep)
     noise = floor.sigma_um * data.relative
     constants = judged_constants(evidence, told, share)
@@ -417,11 +418,9 @@ def _changes(found: Diagnosis, evidence: Evidence) -> Diagnosis:
     rest = Unexplained(size, titles, found.rest.odds if unnamed else 0.0, 0.0, None)
     told = _visible_size(found.data, [each.shown for each in new])
     verdict = verdict_of(new, rest, told, found.floor, found.gap.floor, found.data.little)
-    machine = found.machine if new else None
     proposal = found.proposal if found.proposal and found.proposal.name.startswith(CHANGE) else None
-    return replace(
-        found, verdict=verdict, findings=new, rest=rest, machine=machine, proposal=proposal, steady=steady, dates=True
-    )
+    machine = found.machine if new else None
+    return replace(found, verdict=verdict, findings=new, rest=rest, machine=machine, proposal=proposal, steady=steady)
 
 
 def _visible_size(data: ResidualData, shown: Sequence[Array]) -> float:
@@ -464,7 +463,7 @@ def weighed(
     relative, outlying = downweighted(seen, everything, groups)
     background = estimated_background(seen, everything, relative, named)
     invisible = tuple((candidate.name, share) for candidate, share in visible.invisible)
-    case = Case(seen, len(candidates), unheard_of, invisible, outlying)
+    case = Case(seen, len(candidates), unheard_of, invisible, outlying, since)
     return case, Comparison(Evidence(background, groups, len(named)))
 
 

@@ -20,7 +20,7 @@ from ncfix.diagnosis.effect_form import EffectForm
 from ncfix.diagnosis.evidence import MISSHAPEN, Comparison, Member, Members
 from ncfix.diagnosis.forms import shape_variations_with
 from ncfix.diagnosis.noise import everything_at
-from ncfix.diagnosis.selection import ALIAS_LOG_ODDS, ASSUMED, TOLD_APART, Selected, untold
+from ncfix.diagnosis.selection import ASSUMED, Selected, lead_needed, untold
 from ncfix.measure.observation import Observation
 from ncfix.values import frozen
 
@@ -113,7 +113,7 @@ def prospect(scale: Comparison, selected: Selected, names: Sequence[str], new: O
             if j != k:
                 ahead, before = odds[k] - odds[j], max(apart.get(names[i], np.inf) for i in (j, k))
                 told = before + 2 * (float(ahead.mean()) - now[k] + now[j])
-                alone &= ahead > ALIAS_LOG_ODDS * (ASSUMED if told < TOLD_APART else 1.0)
+                alone &= ahead > lead_needed(told)
         chances[k] = alone.mean()
     tempered = [(w - now[0]) / (ASSUMED if name in apart else 1.0) for name, w in zip(names, now, strict=True)]
     return Prospect(tuple(names), chances, np.exp(tempered - logsumexp(tempered)))

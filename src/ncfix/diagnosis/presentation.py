@@ -101,7 +101,7 @@ def _table(diagnosis: Diagnosis) -> list[str]:
 
 def verdict(diagnosis: Diagnosis) -> str:
     """The verdict as a sentence."""
-    if diagnosis.dates:
+    if diagnosis.case.since:
         return CHANGED[diagnosis.verdict]
     if diagnosis.verdict == NOTHING and diagnosis.rest.lacking:
         return f"more than noise is left (p = {diagnosis.p_left:.1g}), but no more than the little that machines have"

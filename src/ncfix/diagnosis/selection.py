@@ -41,6 +41,8 @@ ALIAS_LOG_ODDS = 3.0
 """Log odds (20 to 1) within which another name explains the same data as well."""
 ASSUMED = 3.0
 """Factor on `ALIAS_LOG_ODDS` for names that act alike, whose odds rest on assumed courses and shapes."""
+WITHIN = ASSUMED * ALIAS_LOG_ODDS + TOLD_APART / 2
+"""Log odds within which a name is looked at as an alias; see `lead_needed`."""
 NO_BETTER = 1.0
 """Log odds within which a name made of fewer errors is preferred."""
 TRIED_JOINTLY = 3
@@ -55,6 +57,13 @@ CONSTANT_UM = 300.0
 """Standard deviation of the lacking constants while they are free, um at the tool tip, for a machining centre."""
 FEW_SHOWN = 0.5
 """If less than this share of the visible names is findable at the largest size, the data show hardly anything."""
+
+
+def lead_needed(told: float) -> float:
+    """Log odds by which a name must lead another to leave it out, if `told` squared noise units of the data tell them
+    apart: these are told / 2 of the lead. What is beyond rests on assumed courses and shapes.
+    """
+    return ALIAS_LOG_ODDS if told >= TOLD_APART else max(told, 0.0) / 2 + ASSUMED * ALIAS_LOG_ODDS
 
 
 def untold(scale: Comparison, selected: Selected, name: str, other: str) -> float:
@@ -227,12 +236,16 @@ def _changes(scale: Comparison, offered: Sequence[str], members: Members, fixed:
     return found
 
 
-def likeliest(scale: Comparison, offered: Sequence[str], members: Members) -> dict[str, Member]:
-    """The effects with the best odds given some members, each in its likeliest form and size."""
+def likeliest(scale: Comparison, offered: Sequence[str], members: Members, beside: str = "") -> dict[str, Member]:
+    """The effects with the best odds given some members, each in its likeliest form and size; all names that come near
+    the one `beside`.
+    """
     odds, evidence = scale.candidate_odds(members), scale.evidence
     free = {name: odds.of(evidence.forms[name]) for name in offered if name not in members}
     order = sorted(free, key=lambda name: -free[name])
-    named = [name for name in order if name in evidence.names][:TRIED]
+    near = odds.of(evidence.forms[beside]) - WITHIN if beside else np.inf
+    named = [name for name in order if name in evidence.names]
+    named = [name for place, name in enumerate(named) if place < TRIED or free[name] > near]
     nameless = [name for name in order if name in evidence.alternatives][: TRIED // 2]
     return {name: odds.likeliest(evidence.forms[name])[0] for name in (*named, *nameless)}
 
@@ -248,7 +261,7 @@ def with_alternatives(scale: Comparison, members: Members) -> Selected:
         sort = [each for each in _sort(evidence, name) if each not in others]
         tried = {
             each: scale.candidate_odds(others).likeliest(evidence.forms[each], FORMS)
-            for each in likeliest(scale, sort, others)
+            for each in likeliest(scale, sort, others, beside=name)
         }
         tried[name] = [members[name]]
         heaviest = {each: max(scale.weight({**others, each: own}) for own in forms) for each, forms in tried.items()}
@@ -256,14 +269,16 @@ def with_alternatives(scale: Comparison, members: Members) -> Selected:
         paid = entry_price(len(members)) - entry_price(len(others))
         odds[name] = gained.pop(name) + paid
         runners_up[name] = {each: value + paid for each, value in gained.items()}
-        near = [each for each, value in runners_up[name].items() if value > odds[name] - ASSUMED * ALIAS_LOG_ODDS]
+        near = [each for each, value in runners_up[name].items() if value > odds[name] - WITHIN]
         there = scale.all(members)
         for other in [each for each in near if not _overlap(evidence, there, members[name], each)]:
             del runners_up[name][other]
         acting_alike[name] = frozenset(
             each
             for each in near
-            if each in runners_up[name] and _untold(evidence, there, members[name], each) < TOLD_APART
+            if each in runners_up[name]
+            and (told := _untold(evidence, there, members[name], each)) < TOLD_APART
+            and runners_up[name][each] > odds[name] - lead_needed(told)
         )
     ranked = {name: members[name] for name in sorted(members, key=lambda name: -odds[name])}
     return Selected(ranked, odds, runners_up, frozenset(evidence.alternatives), acting_alike)
@@ -338,11 +353,7 @@ def _less(members: Members, out: str) -> dict[str, Member]:
 def aliases(selected: Selected, name: str) -> list[str]:
     """Names that explain a member's data nearly as well, likeliest first; more tolerant for names that act alike."""
     rest, acting_alike = selected.runners_up[name], selected.acting_alike.get(name, frozenset())
-    found = [
-        key
-        for key in rest
-        if rest[key] > selected.odds[name] - ALIAS_LOG_ODDS * (ASSUMED if key in acting_alike else 1.0)
-    ]
+    found = [key for key in rest if key in acting_alike or rest[key] > selected.odds[name] - ALIAS_LOG_ODDS]
     return sorted(found, key=lambda key: -rest[key])
 
 

@@ -26,6 +26,8 @@ RADIAN_SHARE = 0.4
 """Positions that, taken as radians, span more than this share of the travel are probably radians."""
 ELSEWHERE = 2.0
 """Largest distance of poses from the circle of a ball-bar, mm: the range of its reading."""
+MARK_MM, MARK_RATIO = 999.0, 20.0
+"""Smallest deviation, mm, and smallest ratio to the median one, of a number of nines that marks a missing reading."""
 UNITS = {"inches": 25.4, "metres": 1000.0}
 """Unit -> mm."""
 UNIT_SHARE = 0.8
@@ -39,7 +41,8 @@ def checked(measurement: Measurement, machine: Machine, lines: Sequence[str] = (
 
     lines  lines of the file, to be shown with messages
     """
-    faults = [*_directions(measurement), *_clock(measurement), *_named(measurement, machine), *_lengths(measurement)]
+    faults = [*_directions(measurement), *_clock(measurement), *_named(measurement, machine)]
+    faults += [*_lengths(measurement), *_marks(measurement)]
     if faults:
         raise ConfigError.collected([_shown(fault, lines) for fault in faults])
     remarks = [
@@ -112,6 +115,16 @@ def _lengths(measurement: Measurement) -> Iterator[Message]:
             yield Message("NCF612", "both ends of this length are the same position", measurement.place(int(row)))
 
 
+def _marks(measurement: Measurement) -> Iterator[Message]:
+    """NCF612: deviations of 999 mm, 9999 mm ... that mark missing readings."""
+    for name, rows, values in _errors(measurement):
+        size = np.abs(values[rows])
+        for row in rows[(size >= MARK_MM) & (size > MARK_RATIO * np.median(size))]:
+            if not f"{abs(values[row]):.12g}".replace(".", "").strip("9"):
+                text = f"{name} is {values[row]:.12g}: a mark of what was not read?"
+                yield Message("NCF612", text, measurement.place(int(row)), "leave out this row")
+
+
 def _twice(measurement: Measurement) -> Iterator[Message]:
     """NCF613: rows of one state in one set without a column that marks repeats; one remark for the file."""
     if "repeat" in measurement.labels or "run" in measurement.columns:
@@ -155,13 +168,11 @@ def _radians(measurement: Measurement, machine: Machine) -> Iterator[Message]:
 
 
 def _commanded(measurement: Measurement, axis: str) -> tuple[Ints, Array]:
-    """Rows and commanded positions of an axis, mm or degree; for kind `length` of both ends."""
-    if measurement.kind == "axis":
-        rows = np.flatnonzero(np.array(measurement.labels["axis"]) == axis)
-        return rows, measurement.column("position")[rows]
-    names = [name for name in (axis, f"a{axis.lower()}", f"b{axis.lower()}") if name in measurement.columns]
-    values = [measurement.columns[name] for name in names if name == axis or name in ENDS]
-    return np.tile(np.arange(len(measurement)), len(values)), np.concatenate([np.zeros(0), *values])
+    """Rows and positions of an axis, mm or degree, in all columns but the centre of a bar, where no axis stands."""
+    found = measurement.columns_of(axis, CENTRE)
+    rows = [np.flatnonzero(there) for there in found.values()]
+    values = [measurement.columns[name][there] for name, there in found.items()]
+    return np.concatenate([np.zeros(0, dtype=np.int64), *rows]), np.concatenate([np.zeros(0), *values])
 
 
 def _looks_like_radians(values: Array, low: float, high: float) -> bool:

@@ -53,9 +53,9 @@ CODES = {
         "Give a set of its own to what was measured after the clock was set back.",
     ),
     "NCF612": Code(
-        "a label, direction or distance that is none",
-        "Axis, component, ball or target of a row does not exist, a direction is none of -1, 0 and 1, or a distance is "
-        "not above zero.",
+        "a label, direction, distance or reading that is none",
+        "Axis, component, ball or target of a row does not exist, a direction is none of -1, 0 and 1, a distance is "
+        "not above zero, or a deviation is 999 or 9999, by which programs mark what was not read.",
     ),
     "NCF613": Code(
         "a pose was measured twice",

@@ -185,6 +185,36 @@ class Measurement:
         """Several columns as one array, (n, k)."""
         return np.stack([self.columns[name] for name in names], axis=-1)
 
+    def columns_of(self, axis: str, right: Sequence[str] = ()) -> dict[str, Mask]:
+        """The columns that hold positions of an axis, and in which rows (n,): commanded, probed, of both ends of a
+        length, of a bar's centre, of direct readings; but for those that are `right`.
+        """
+        everywhere, low = np.ones(len(self), dtype=bool), axis.lower()
+        own = {f"{where}{low}" for where in "mabc"} & {*self.form.columns} - {*right}
+        found = {name: everywhere for name in self.columns if name == axis or name in own}
+        if self.kind == "axis":
+            found["position"] = np.array([name == axis for name in self.labels["axis"]], dtype=bool)
+        return {name: rows for name, rows in found.items() if rows.any()}
+
+    def times(self, axes: Sequence[str], factor: float, right: Sequence[str] = ()) -> Measurement:
+        """These rows with all positions of some axes, or other columns, times a factor."""
+        found = dict(self.columns)
+        for axis in axes:
+            own = self.columns_of(axis, right)
+            found |= {name: np.where(rows, factor, 1.0) * found[name] for name, rows in own.items()}
+        return replace(self, columns=found)
+
+    def exchanged(self, first: str, second: str, right: Sequence[str] = ()) -> Measurement | None:
+        """These rows with the positions of two axes exchanged; None if they are not in the same kinds of columns."""
+        if self.kind == "axis":
+            return None
+        mine, other = self.columns_of(first, right), self.columns_of(second, right)
+        names = {name: name.replace(first, second).replace(first.lower(), second.lower()) for name in mine}
+        if not names or {*names.values()} != {*other}:
+            return None
+        pairs = {**names, **{there: here for here, there in names.items()}}
+        return self.with_columns({name: self.columns[source] for name, source in pairs.items()})
+
     def positions(self, machine: Machine) -> Array:
         """The commanded axis positions, (n, n_axes), mm and rad; an axis without a column is at zero."""
         return np.stack([self.column(axis.name) * axis.unit for axis in machine.axes], axis=-1)
@@ -218,6 +248,11 @@ class Measurement:
             labels={name: tuple(values[i] for i in index) for name, values in self.labels.items()},
             lines=self.lines[index] if len(self.lines) else self.lines,
         )
+
+
+def perhaps_right(measurements: Sequence[Measurement]) -> Sequence[tuple[str, ...]]:
+    """Which columns may be right where the positions of an axis are not: none, or where the centre of a bar is."""
+    return ((), CENTRE) if any(CENTRE[0] in each.columns for each in measurements) else ((),)
 
 
 def groups(labels: Sequence[str]) -> tuple[tuple[str, ...], Ints]:

@@ -19,7 +19,7 @@ from ncfix.diagnostics import Message, NcfixError
 from ncfix.machine import Machine
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Measurement
+from ncfix.measure.measurement import Measurement, perhaps_right
 from ncfix.values import frozen
 
 ODD = {"NCF614", "NCF615", "NCF616"}
@@ -212,41 +212,29 @@ def _units(file: int, measurement: Measurement, machine: Machine) -> Iterator[Su
     there = [axis.name for axis in machine.axes if axis.rotary and np.ptp(measurement.column(axis.name)) > 0]
     small = [name for name in there if np.abs(measurement.column(name)).max() <= TURN_RAD]
     for names in [(name,) for name in small] + ([tuple(small)] if len(small) > 1 else []):
-        columns = {name: np.rad2deg(measurement.columns[name]) for name in names}
         text = f"the positions of {' and '.join(names)} look like radians: degrees are asked for"
-        yield Suspect(text, "multiply them by 180 / pi", file, measurement.with_columns(columns))
+        yield Suspect(text, "multiply them by 180 / pi", file, measurement.times(names, 180 / np.pi))
 
 
 def _turned(file: int, measurement: Measurement, machine: Machine) -> Iterator[Suspect]:
     """The suspects that the positions of one axis have the wrong sign."""
-    for axis in machine.axes:
+    for axis, right in product(machine.axes, perhaps_right([measurement])):
         name = axis.name
-        columns = {each: -measurement.columns[each] for each in _of(measurement, name)}
-        if any(np.ptp(values) > 0 for values in columns.values()):
+        if any(np.ptp(measurement.columns[each]) > 0 for each in measurement.columns_of(name)):
             text = f"{name} is turned round: with its positions of the other sign the readings are explained"
             hint = f"see `direction` of {name} in the machine file, or the sign of its column"
-            yield Suspect(text, hint, file, measurement.with_columns(columns))
-
-
-def _of(measurement: Measurement, axis: str) -> list[str]:
-    """The columns that hold positions of an axis."""
-    low = axis.lower()
-    names = (axis, f"m{low}", f"a{low}", f"b{low}")
-    return [name for name in names if name in measurement.columns]
+            yield Suspect(text, hint, file, measurement.times([name], -1.0, right))
 
 
 def _swapped(file: int, measurement: Measurement, machine: Machine) -> Iterator[Suspect]:
     """Suspects: exchanged position columns of two axes."""
     for kind in (True, False):
-        names = [axis.name for axis in machine.axes if axis.rotary == kind and _of(measurement, axis.name)]
-        for first, second in combinations(names, 2):
-            mine, other = _of(measurement, first), _of(measurement, second)
-            if len(mine) != len(other):
-                continue
-            pairs = [*zip(mine, other, strict=True), *zip(other, mine, strict=True)]
-            columns = {name: measurement.columns[source] for name, source in pairs}
-            text = f"the columns {', '.join(mine)} and {', '.join(other)} look exchanged"
-            yield Suspect(text, "exchange their names", file, measurement.with_columns(columns))
+        names = [axis.name for axis in machine.axes if axis.rotary == kind]
+        for (first, second), right in product(combinations(names, 2), perhaps_right([measurement])):
+            if (changed := measurement.exchanged(first, second, right)) is not None:
+                mine, other = (", ".join(measurement.columns_of(name, right)) for name in (first, second))
+                text = f"the columns {mine} and {other} look exchanged"
+                yield Suspect(text, "exchange their names", file, changed)
 
 
 def _series(file: int, measurement: Measurement, files: int) -> Iterator[Suspect]:

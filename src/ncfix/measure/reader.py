@@ -33,6 +33,18 @@ ONCE = ("ncfix-measurement", "kind", "noise_um", "noise_urad", "point", "frame",
 NAMED = {"distance": (2, 2), "target": (1, 3)}
 """Header key -> numbers of names and of numbers in its value, such as `distance: 1 2 304.6686 0.0012`."""
 COMMA = re.compile(r"[-+]?\d+,\d+")
+NOT_READ = "leave out a row in which this was not read"
+UNITS = r"mm|cm|m|in|inch|deg|degrees?|\u00b0|m?rad|[u\u00b5\u03bc](?:m|rad)|arcsec|as|\"|''|s|sec"
+"""As units are written; the micro sign has two characters."""
+ODD_CELLS = (
+    (re.compile(r"-+|\.+|\?+|[nN][/.]?[aA]\.?|#.*|(?i:[-+]?nan|null|none|missing|error|inf)"), NOT_READ),
+    (re.compile(rf"[\[(]?({UNITS})[\])]?"), "leave out the line with units: lengths are mm, angles of axes degree"),
+    (re.compile(rf"[-+]?[\d.,]+\s*({UNITS})"), "a cell has the number alone: lengths are mm, angles of axes degree"),
+    (re.compile(r"[-+]?\d{1,3}(?:[.,'\s\u2019]\d{3})+(?:[.,]\d*)?"), "write it without marks of thousands"),
+    (re.compile(r"[\u2010-\u2015\u2212][\d.,]+"), "a minus is written -"),
+)
+"""Cells that are no numbers, as instruments and people write them, and what helps."""
+NAME_AND_UNIT = re.compile(rf"(\w+?)[\s_/]*[\[(]?\s*({UNITS})\s*[\])]?")
 LABELS = ("set", "repeat")
 """Columns of labels that every kind may have."""
 
@@ -220,7 +232,8 @@ def _header_numbers(text: MeasurementLines, value: Cell, key: str, count: int) -
     found = [_finite(part) for part in value.text.split()]
     if len(found) != count or any(number is None for number in found):
         wanted = "a number" if count == 1 else f"{count} numbers"
-        text.mark(value, "NCF603", f"{key} is {wanted}, not {value.text!r}")
+        hint = "a number has a decimal point, not a comma" if COMMA.search(value.text) else ""
+        text.mark(value, "NCF603", f"{key} is {wanted}, not {value.text!r}", hint)
     elif key.startswith("noise") and (found[0] or 0.0) <= 0:
         text.mark(value, "NCF603", f"{key} is above zero, not {value.text}")
 
@@ -283,9 +296,11 @@ def _unknown_name(text: MeasurementLines, name: Cell, known: set[str], form: Mea
         text.mark(name, "NCF610", f"the machine has no axis {axis}, only {has}")
         return
     if not name.text:
-        text.mark(name, "NCF604", "a column without a name", "is there a comma too many?")
+        text.mark(name, "NCF604", "a column without a name", "is there a separator too many at the end of the line?")
         return
     hint = did_you_mean(name.text, known) or f"kind {form.name} has {', '.join(form.columns)}"
+    if (unit := NAME_AND_UNIT.fullmatch(name.text)) and unit[1] in known:
+        hint = f"call it {unit[1]}, without a unit: lengths are mm, angles of axes degree, measured angles rad"
     text.mark(name, "NCF604", f"unknown column {name.text!r}", hint)
 
 
@@ -343,7 +358,7 @@ def _numbers(text: MeasurementLines, cells: Iterable[Cell], name: str) -> Array:
 
 def _number(text: MeasurementLines, cell: Cell, name: str) -> float:
     if not cell.text:
-        text.mark(cell, "NCF607", f"column {name!r} is empty in this row")
+        text.mark(cell, "NCF607", f"column {name!r} is empty in this row", NOT_READ)
         return math.nan
     try:
         plain = text.separated.plain(cell.text)
@@ -353,11 +368,15 @@ def _number(text: MeasurementLines, cell: Cell, name: str) -> float:
     try:
         value = float(plain.replace("_", "?"))
     except ValueError:
-        hint = "1 towards plus, -1 towards minus, 0 not known" if name == "direction" or name.startswith("dir_") else ""
+        hint = next((said for odd, said in ODD_CELLS if odd.fullmatch(cell.text)), "")
+        if name == "direction" or name.startswith("dir_"):
+            hint = "1 towards plus, -1 towards minus, 0 not known"
+        elif cell.text == name:
+            hint = "leave out this line: the columns are named once"
         text.mark(cell, "NCF608", f"column {name!r}: {cell.text!r} is not a number", hint)
         return math.nan
     if not math.isfinite(value):
-        text.mark(cell, "NCF608", f"column {name!r}: {cell.text} is not a finite number")
+        text.mark(cell, "NCF608", f"column {name!r}: {cell.text} is not a finite number", NOT_READ)
     elif abs(value) > MAX_NUMBER:
         text.mark(cell, "NCF608", f"column {name!r}: {cell.text} is more than anything that is measured")
     return value

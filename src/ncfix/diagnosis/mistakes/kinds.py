@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
 from ncfix.arrays import Array, Ints
 from ncfix.diagnosis.mistakes.foreign_tables import without_foreign_tables
-from ncfix.diagnosis.mistakes.mistake import Mistake, times, undone_by_columns
+from ncfix.diagnosis.mistakes.mistake import Mistake, undone_by_columns
 from ncfix.diagnosis.mistakes.stale_tables import shifted_tables
 from ncfix.diagnosis.mistakes.units import (
     DEVIATIONS,
@@ -30,7 +30,7 @@ from ncfix.machine.axes import Axis
 from ncfix.machine.plausible import much, times_a_machining_centre
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import orthonormal, without
-from ncfix.measure.measurement import Measurement
+from ncfix.measure.measurement import Measurement, perhaps_right
 from ncfix.values import frozen
 
 DOUBTED, OFF = 0.3, 3.0
@@ -257,9 +257,9 @@ def points_of_axes(measurements: tuple[Measurement, ...], machine: Machine, now:
 
 
 def looking_like_constants(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[Mistake]:
-    """Mistakes that changed constants could imitate: axis points, and units of positions that were read by a probe."""
+    """Mistakes that changed constants could imitate: axis points, and units in which probe and gauge show little."""
     yield from points_of_axes(measurements, machine, now)
-    if any(each.kind == "probe" for each in measurements):
+    if any(each.kind in ("probe", "length") for each in measurements):
         yield from units(measurements, machine)
 
 
@@ -269,8 +269,6 @@ def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine, 
     if any(each.kind not in DEVIATIONS for each in measurements):
         yield from units_of_values(measurements, machine)
     yield from units_of_one_file(measurements, machine)
-    if any("radius" in each.columns for each in measurements):
-        return  # the length of a ball-bar confirms the axis positions
     yield from units(measurements, machine)
     yield from _exchanged_axes(measurements, machine)
     for axis in machine.axes:
@@ -280,13 +278,9 @@ def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine, 
             yield Mistake(f"rotary sign {axis.name}", title, axis.name, turned, measurements)
         else:
             title = f"axis sign: the positions of {axis.name} count the other way"
-            yield Mistake(
-                f"axis sign {axis.name}",
-                title,
-                axis.name,
-                machine,
-                times(measurements, [axis.name], -1.0),
-            )
+            for right in perhaps_right(measurements):
+                changed = tuple(each.times([axis.name], -1.0, right) for each in measurements)
+                yield Mistake(f"axis sign {axis.name}", title, axis.name, machine, changed)
     yield from _unstated_tools(measurements, machine)
     yield from _other_machine(measurements, machine, now)
     for shifted, title in shifted_tables(measurements, machine):
@@ -298,13 +292,10 @@ def _exchanged_axes(measurements: tuple[Measurement, ...], machine: Machine) -> 
     """Mistakes of exchanged position columns of two axes."""
     for kind in (False, True):
         names = [axis.name for axis in machine.axes if axis.rotary == kind]
-        for first, second in combinations(names, 2):
-            if all(first in each.columns and second in each.columns for each in measurements):
-                changed = tuple(
-                    each.with_columns({first: each.columns[second], second: each.columns[first]})
-                    for each in measurements
-                )
-                title = f"the columns {first} and {second} are exchanged"
+        for (first, second), right in product(combinations(names, 2), perhaps_right(measurements)):
+            changed = tuple(filter(None, (each.exchanged(first, second, right) for each in measurements)))
+            if len(changed) == len(measurements):
+                title = f"the positions of {first} and {second} are exchanged"
                 yield Mistake(f"swapped {first} {second}", title, "", machine, changed)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from ncfix.machine import Machine
 from ncfix.measure.measurement import Measurement
 from ncfix.values import frozen
@@ -61,12 +59,3 @@ def undone_by_columns(
         for each in measurements
     )
     return Mistake(name, title, "", machine, changed, stretch=stretch)
-
-
-def times(measurements: tuple[Measurement, ...], axes: Sequence[str], factor: float) -> tuple[Measurement, ...]:
-    """The measurements with the columns of these names (and `mx` ... of these axes) multiplied by a factor."""
-    names = {*axes, *(f"m{axis.lower()}" for axis in axes)}
-    return tuple(
-        each.with_columns({name: factor * values for name, values in each.columns.items() if name in names})
-        for each in measurements
-    )

@@ -32,8 +32,8 @@ from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine
 from ncfix.measure.measurement import Measurement, component_of
 
-SUSPECT = 1.15
-"""Residual, in units of the noise, from which mistakes are sought."""
+SUSPECT, TOO_GOOD = 1.15, 0.7
+"""Residual, in units of the noise, from which mistakes are sought; and below which a larger unit is suspected."""
 OTHERWISE = 0.2
 """If moved constants explain the data, a mistake must leave less than this share of the squares that they explain."""
 AS_STANDING = 1.5
@@ -100,7 +100,7 @@ def _suspects(
     far = left >= SUSPECT * now.noise or any(looks_typed(effect) for effect in machine.effects)
     moved = standing >= SUSPECT * max(left, now.noise)  # constants, or points of axes, or units
     deep: list[Mistake] = []
-    if far or moved:
+    if far or moved or left < TOO_GOOD * now.noise:
         kinds = not_of_first_order if far else looking_like_constants
         deep = [each for each in kinds(measurements, machine, now) if plain(each.name) not in refused]
     tried = _judged(measurements, machine, now, TIGHT_UM, deep, refused)

@@ -10,13 +10,13 @@ import numpy as np
 
 from ncfix.arrays import Mask
 from ncfix.diagnosis.checks import sensible
-from ncfix.diagnosis.mistakes.mistake import Mistake, times
+from ncfix.diagnosis.mistakes.mistake import Mistake
 from ncfix.diagnosis.residual_data import misfit
 from ncfix.diagnosis.selection import ALIAS_LOG_ODDS
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.plausible import times_a_machining_centre
-from ncfix.measure.measurement import TURNS, Measurement, component_of
+from ncfix.measure.measurement import TURNS, Measurement, component_of, perhaps_right
 
 UNIT_OF_VALUES = "unit of values"
 LARGE_RAD = 2e-4
@@ -123,7 +123,8 @@ def units_of_tools(measurements: tuple[Measurement, ...], machine: Machine) -> I
     """Mistakes of tool lengths given in another unit than mm."""
     for unit, factor in (("m", 1e3), ("inch", INCH)):
         title = f"tool length: the lengths of the tools are in {unit}, not in mm"
-        yield Mistake("tool length", title, "", machine, times(measurements, ["tool_length"], factor))
+        changed = tuple(each.times(["tool_length"], factor) for each in measurements)
+        yield Mistake("tool length", title, "", machine, changed)
 
 
 def units_of_one_file(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
@@ -145,13 +146,18 @@ def units(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[M
     """Mistakes of axis positions in another unit than mm and degree, and of machine file angles typed in degrees."""
     linear = [axis.name for axis in machine.axes if not axis.rotary]
     for name, said, factor in (("inch", "inches", INCH), ("metre", "metres", 1e3), ("um", "micrometres", 1e-3)):
-        changed = times(measurements, linear, factor)
-        title = f"{name}: positions of the linear axes are in {said}"
-        yield Mistake(name, title, "", machine, changed, stretch=_stretch(measurements, linear, factor))
+        offered = [(linear, "positions of the linear axes", right) for right in perhaps_right(measurements)]
+        if any(each.kind == "length" for each in measurements):
+            offered.append(([*linear, "length", "nominal", "radius"], "positions and lengths", ()))
+        for names, what, right in offered:
+            changed = tuple(each.times(names, factor, right) for each in measurements)
+            stretch = _stretch(measurements, names, factor)
+            yield Mistake(name, f"{name}: {what} are in {said}", "", machine, changed, stretch=stretch)
     rotary = [axis.name for axis in machine.axes if axis.rotary]
     if rotary and max(float(np.abs(each.column(a)).max()) for each in measurements for a in rotary) < TURN_RAD:
         title = "radian: angles in the measurement are in radians instead of degrees"
-        yield Mistake("degree", title, "", machine, times(measurements, rotary, 180 / np.pi))
+        changed = tuple(each.times(rotary, 180 / np.pi) for each in measurements)
+        yield Mistake("degree", title, "", machine, changed)
     for index, effect in enumerate(machine.effects):
         if looks_typed(effect):
             title = f"degree: {effect.name} of the machine file was typed in degrees instead of radians"
@@ -170,8 +176,9 @@ def _in_radians(machine: Machine, index: int) -> Machine:
     return machine.replace(effects=tuple(effects))
 
 
-def _stretch(measurements: tuple[Measurement, ...], axes: Sequence[str], factor: float) -> float:
-    """The mean factor on readings if positions of these axes are scaled by `factor`: a probe reads axis positions."""
-    names = {*axes, *(f"m{axis.lower()}" for axis in axes)}
-    shares = [len(names & set(each.measured)) / max(len(each.measured), 1) for each in measurements]
+def _stretch(measurements: tuple[Measurement, ...], names: Sequence[str], factor: float) -> float:
+    """The mean factor on readings if these columns are scaled by `factor`: a probe reads axis positions."""
+    scaled = [{column for name in names for column in each.columns_of(name)} for each in measurements]
+    pairs = zip(scaled, measurements, strict=True)
+    shares = [len(own & {*each.measured}) / max(len(each.measured), 1) for own, each in pairs]
     return float(factor ** np.mean(shares))
