@@ -134,9 +134,7 @@ class FixReport:
                 f"{left:.2f} um are left here at the tool tip, more than the tolerance of {tolerance_um:g} um "
                 f"and the {self.rounding_um:.2f} um of the control's digits"
             )
-            hint = (
-                "a motion near it is not corrected, must not be split or leave its plane, or the control works it out"
-            )
+            hint = "the reason is a motion near it that is not corrected, or that the control works out by itself"
             found.append(Message("NCF416", text, Place(self.path, int(line or 0)), hint))
         sides = [
             (self.error_before_um.get(figure) or 0.0, self.error_after_um.get(figure) or 0.0)
