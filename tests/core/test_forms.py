@@ -21,6 +21,7 @@ from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, State, load
 from ncfix.text.reader import read
+from program.arcs import full_of_arcs
 from program.klartext import test_parts
 from program.test_many_blocks import klartext, rs274
 
@@ -82,6 +83,14 @@ def test_programs_of_other_controls(source: bytes, dialect: str, root: Path) -> 
     assert fixed(source, load(root / "benchmarks/five_axis.toml"), dialect)
     assert CALLS["chain.tips"]
     assert CALLS["words.WordPrinter.write"]
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "siemens"])
+def test_arcs(dialect: str, root: Path) -> None:
+    head = ["G90 G94 F1000", "G71" if dialect == "siemens" else "G21", "G0 X0. Y0. Z0. B0. C0."]
+    lines = [*head, *full_of_arcs(3, 60, sinumerik=dialect == "siemens"), "M2\n"]
+    assert fixed("\n".join(lines).encode(), load(root / "benchmarks/five_axis.toml"), dialect)
+    assert CALLS["words.WordPrinter.write_centres"]
 
 
 @pytest.mark.parametrize("folder", ["linuxcnc", "fanuc", "heidenhain"])

@@ -302,3 +302,86 @@ def test_there_has_to_be_room_for_all_that_may_be_written() -> None:
     for ends in ([[1.0]], [[1.0, 2.0, 3.0]]):
         with pytest.raises(IndexError):
             written(ends, [0, 1], rows=[0])
+
+
+def centred(other: dict[str, Any], wanted: tuple[float, float] = (2.5, 0.25), **arguments: Any) -> tuple[Any, ...]:
+    """Whether the centre words of an arc are certain, the text with them, and the centre; the F of `TEXT` is its I."""
+    own = pen(**other)
+    given = {
+        "rows": np.array([0], dtype=np.int32),
+        "plane": ints((0, 1)),
+        "spatial": ints(0, 1, 1),
+        "places": np.array([[(0.0, 0.0), (1.5, -2.25), wanted, (0.0, 0.0)]]),
+        "slots": ints((3, -1, -1), (-1, -1, -1)),
+        "heads": characters([b" I", b" J", b" K"], [b" I", b" J", b" K"]),
+        "radius": ints(-1, -1),
+        "taken": ints(((2, 0), (3, 0)), ((-1, 0), (-1, 0))),
+        "start": np.zeros(3, dtype=np.int64),
+        "stop": np.zeros(3, dtype=np.int64),
+        "length": np.zeros(3, dtype=np.int64),
+        "data": np.zeros(2 * ROOM, dtype=np.uint8),
+        "centre": np.zeros((1, 2)),
+        "clear": np.zeros(1, dtype=np.uint8),
+    }
+    assert given.keys() >= arguments.keys()
+    given |= arguments
+    own.write_centres(*given.values())
+    text, taken, start, stop = TEXT, own.size, given["start"], given["stop"]
+    for k in sorted(range(own.edits), key=lambda k: (start[k], stop[k] > start[k], k), reverse=True):
+        at = int(given["length"][:k].sum())
+        text = text[: start[k]] + given["data"][at : at + given["length"][k]].tobytes() + text[stop[k] :]
+    assert taken == given["length"][: own.edits].sum()
+    return bool(given["clear"][0]), text.splitlines()[0], given["centre"][0].tolist()
+
+
+BY_RADIUS = {"slots": ints((-1, -1, -1), (-1, -1, -1)), "radius": ints(3, -1)}
+
+
+def test_centre_words_are_rewritten_or_added() -> None:
+    assert centred({}) == (True, b"N1 X1.5 Y-2.25 J0.250 F2.5", [2.5, 0.25])
+    assert centred({}, (9.0004, 0.0)) == (True, b"N1 X1.5 Y-2.25 F9", [9.0, 0.0])
+
+
+def test_a_radius_that_means_another_centre_gives_way_to_centre_words() -> None:
+    assert centred({}, **BY_RADIUS) == (True, b"N1 X1.5 Y-2.25 I2.500 J0.250", [2.5, 0.25])
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_radius_that_means_the_wanted_centre_stays(side: int) -> None:
+    half = np.hypot(1.5, -2.25) / 2
+    height = side * np.sqrt(81 - half * half) / (2 * half)
+    wanted = (0.75 + height * 2.25, -1.125 + height * 1.5)
+    certain, text, centre = centred({}, wanted, **BY_RADIUS)
+    assert (certain, text) == (True, b"N1 X1.5 Y-2.25 F9")
+    assert centre == pytest.approx(wanted)
+
+
+def test_centres_that_are_not_certain_are_left_as_they_are() -> None:
+    """A centre halfway between two outputs, and a radius of half the chord."""
+    values = np.array([1.0, 1.5, -2.25, np.hypot(1.5, -2.25) / 2, 3.0])
+    for found in (centred({}, (2.0625, 0.0)), centred({"values": values}, **BY_RADIUS)):
+        assert found[:2] == (False, b"N1 X1.5 Y-2.25 F9")
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"rows": np.array([2], dtype=np.int32)},
+        {"rows": np.array([-1], dtype=np.int32)},
+        *({"plane": ints(plane)} for plane in ((0, 3), (-1, 1))),
+        *({"spatial": ints(*columns)} for columns in ((0, 2, 1), (-1, 1, 1))),
+        *({"slots": ints((slot, -1, -1), (-1, -1, -1))} for slot in (5, -2)),
+        *({"radius": ints(slot, -1)} for slot in (5, -2)),
+        *({"taken": ints(((slot, 0), (3, 0)), ((-1, 0), (-1, 0)))} for slot in (5, -3)),
+        *({"taken": ints(((2, 0), (slot, 0)), ((-1, 0), (-1, 0)))} for slot in (5, -3)),
+        *({name: np.zeros(2, dtype=np.int64)} for name in ("start", "stop", "length")),
+        {"data": np.zeros(2 * ROOM - 1, dtype=np.uint8)},
+        {"centre": np.zeros((0, 2))},
+        {"clear": np.zeros(0, dtype=np.uint8)},
+        {"places": np.zeros((1, 3, 2))},
+        {"heads": characters([b" I", b" J"], [b" I", b" J"])},
+    ],
+)
+def test_arcs_that_are_not_in_the_text_are_refused(other: dict[str, Any]) -> None:
+    with pytest.raises(IndexError):
+        centred({}, **other)

@@ -68,7 +68,6 @@ MODULES: dict[str, tuple[str, ...]] = {
     "src/ncfix/writer/target.py": WRITER,
     "src/ncfix/writer/pieces.py": WRITER,
     "src/ncfix/writer/bulk.py": BULK,
-    "src/ncfix/writer/bulk_arcs.py": BULK,
     "src/ncfix/writer/bulk_layouts.py": BULK,
     "src/ncfix/compensate/account.py": (
         *("compensate/test_account.py", "cli/test_no_figure.py", "compensate/test_wordless.py"),

@@ -3,8 +3,10 @@ from libc.stdint cimport int32_t, int64_t, uint8_t, uint64_t
 
 cdef extern from "math.h" nogil:
     cpdef double copysign(double, double)
+    cpdef double sqrt(double)
 
 cdef int64_t POINT, ZERO, MINUS, PLUS, VECTOR_HEAD, MOST_STEPS, ROOM
+cdef double SEMICIRCLE, CLOSE_CALL, inf
 
 @cython.final
 cdef class NumberRules:
@@ -64,16 +66,38 @@ cdef class WordPrinter:
         self, int64_t number, int64_t shape, bint several,
         int64_t[::1] start, int64_t[::1] stop, int64_t[::1] length, uint8_t[::1] data,
     ) except -1 nogil
-    @cython.locals(axis=int64_t, begun=int64_t, off=double, k=int64_t)
+    @cython.locals(axis=int64_t, begun=int64_t, off=double, k=int64_t, blank=int64_t, letter=int64_t)
     cdef inline bint add_words(
         self, int64_t place, int64_t shape,
         int64_t[::1] start, int64_t[::1] stop, int64_t[::1] length, uint8_t[::1] data,
     ) except -1 nogil
-    @cython.locals(axis=int64_t, off=double, k=int64_t, at=int64_t, skip=int64_t, moved=bint)
+    @cython.locals(axis=int64_t, off=double, k=int64_t, at=int64_t, blank=int64_t, letter=int64_t, moved=bint)
     cdef bint put_line(self, int64_t lead_from, int64_t lead_to, int64_t shape, uint8_t[::1] data) except -1 nogil
     cdef inline int64_t put_byte(self, uint8_t[::1] data, int64_t character) except -1 nogil
-    @cython.locals(value=double, decimals=int64_t, steps=int64_t, sign=int64_t, k=int64_t, negative=bint)
-    cdef bint put_new(self, uint8_t[::1] data, int64_t shape, int64_t axis, int64_t skip) except -1 nogil
+    @cython.locals(
+        n=int64_t, shapes=int64_t, right=bint, row=int64_t, block=int64_t, edits=int64_t, size=int64_t, shape=int64_t,
+        number=int64_t, k=int64_t, kept=bint, certain=bint, limit=double, off=double, axis=int64_t, word=int64_t,
+        base=double, wanted=double, begun=int64_t, first=int64_t, last=int64_t, blank=int64_t, letter=int64_t,
+    )
+    cpdef int64_t write_centres(
+        self, const int32_t[::1] rows, const int64_t[:, ::1] plane, const int64_t[::1] spatial,
+        const double[:, :, ::1] places, const int64_t[:, ::1] slots, const uint8_t[:, :, ::1] heads,
+        const int64_t[::1] radius, const int64_t[:, :, ::1] taken, int64_t[::1] start, int64_t[::1] stop,
+        int64_t[::1] length, uint8_t[::1] data, double[:, ::1] centre, uint8_t[::1] clear,
+    ) except -1 nogil
+    @cython.locals(word=int64_t)
+    cdef inline bint is_number(self, int64_t number, int64_t slot) except -1 nogil
+    @cython.locals(
+        x=double, y=double, half_chord=double, rise=double, nearest=double, side=int64_t, sign=double, u=double,
+        v=double, off_x=double, off_y=double, off=double,
+    )
+    cdef double centre_by_radius(
+        self, double radius, const double[:, :, ::1] places, int64_t row, double[:, ::1] centre
+    ) except -2 nogil
+    @cython.locals(steps=int64_t, sign=int64_t, negative=bint)
+    cdef bint put_new(
+        self, uint8_t[::1] data, double value, int64_t decimals, int64_t blank, int64_t letter
+    ) except -1 nogil
     @cython.locals(most=int64_t, steps=int64_t, sign=int64_t, digits=int64_t)
     cdef inline bint put_in_style(
         self, uint8_t[::1] data, int64_t start, int64_t stop, double value, int64_t least

@@ -9,7 +9,7 @@ before it writes that.
 
 from __future__ import annotations
 
-from math import copysign
+from math import copysign, inf, sqrt
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -29,6 +29,12 @@ MOST_STEPS = 18
 """Decimals of the finest output step that is written here."""
 ROOM = 16 + MOST_STEPS + 4
 """Bytes that a word takes at most: its head, a sign, digits before the point and behind it."""
+
+
+SEMICIRCLE = 1e-6
+"""Program units: with a radius this close to half the chord, the two possible centres are too close to tell apart."""
+CLOSE_CALL = 1e-4
+"""Share of half an output step: a centre this close to the largest permitted distance is left to `BlockWriter`."""
 
 
 class NumberRules:
@@ -251,7 +257,8 @@ class WordPrinter:
                 if not off <= self.rules.rounded * self.half[axis]:
                     return False
                 continue
-            if not self.put_new(data, shape, axis, 0):
+            blank, letter = self.heads[shape, axis, 0], self.heads[shape, axis, 1]
+            if not self.put_new(data, self.wanted[axis], self.least[axis], blank, letter):
                 return False
             self.now[axis], self.told[axis] = self.read, 1
             self.note(start, stop, length, place, place, self.size - begun)
@@ -270,7 +277,7 @@ class WordPrinter:
         for k in range(self.openings.shape[1]):
             if self.openings[shape, k]:
                 self.put_byte(data, self.openings[shape, k])
-        skip, moved = 0 if self.openings[shape, 0] else 1, False
+        moved = False
         for k in range(self.by_letter.shape[0]):
             axis = self.by_letter[k]
             off = abs(self.wanted[axis] - self.now[axis])
@@ -280,13 +287,115 @@ class WordPrinter:
                 if not off <= self.rules.rounded * self.half[axis]:
                     return False
                 continue
-            if not self.put_new(data, shape, axis, skip):
+            blank = self.heads[shape, axis, 0] if moved or self.openings[shape, 0] else 0
+            letter = self.heads[shape, axis, 1]
+            if not self.put_new(data, self.wanted[axis], self.least[axis], blank, letter):
                 return False
-            self.now[axis], self.told[axis], skip, moved = self.read, 1, 0, True
+            self.now[axis], self.told[axis], moved = self.read, 1, True
         for k in range(self.closings.shape[1]):
             if self.closings[shape, k]:
                 self.put_byte(data, self.closings[shape, k])
         return moved
+
+    # -- centres of arcs ----------------------------------------------------------------------------------------------
+
+    def write_centres(
+        self, rows: Rows, plane: Ints, spatial: Ints, places: Floats, slots: Ints, heads: Bytes, radius: Ints,
+        taken: Ints, start: Ints, stop: Ints, length: Ints, data: Bytes, centre: Floats, clear: Bytes,
+    ) -> int:  # fmt: skip
+        """Write the centre words of arcs whose axis words are written already.
+
+        rows     (k,) their blocks
+        plane    (k, 2) the axes of their planes, X Y Z being 0 1 2
+        spatial  (3,) the columns of X, Y and Z
+        places   (k, 4, 2) in the plane, program units: start, end, wanted centre, and what the centre words count from
+        slots, heads, radius, taken  `centre`, `centre_heads`, `radius` and `taken` of `writer.bulk_layouts.Layouts`
+        start, stop, length, data  room for the edits, as in `write`
+        centre   (k, 2) receives the centre that the text means, program units
+        clear    (k,) receives 1, or 0 for an arc that is left to `BlockWriter`: nothing is written of it
+        """
+        n, shapes = rows.shape[0], self.slots.shape[0]
+        right = min(slots.shape[0], heads.shape[0], radius.shape[0], taken.shape[0]) >= shapes
+        right = right and slots.shape[1] == heads.shape[1] == spatial.shape[0] == 3
+        right = right and heads.shape[2] == taken.shape[1] == taken.shape[2] == 2
+        right = right and min(plane.shape[0], places.shape[0], centre.shape[0], clear.shape[0]) >= n
+        right = right and plane.shape[1] == centre.shape[1] == places.shape[2] == 2 and places.shape[1] == 4
+        right = right and min(start.shape[0], stop.shape[0], length.shape[0]) >= 3 * n
+        if not right or data.shape[0] < 2 * self.room * n:
+            raise IndexError("there is no room for the centres of arcs")
+        for row in range(n):
+            block, edits, size = rows[row], self.edits, self.size
+            if not 0 <= block < self.edges.shape[0]:
+                raise IndexError("there is no such block")
+            shape, number = self.template[block], self.first[block]
+            right = self.fits(block, shape, number) and self.is_number(number, radius[shape])
+            right = right and taken[shape, 0, 0] >= -2 and number + taken[shape, 0, 0] < self.spans.shape[0]
+            right = right and taken[shape, 1, 0] >= -2 and number + taken[shape, 1, 0] < self.spans.shape[0]
+            for k in range(2):
+                right = right and 0 <= plane[row, k] < 3 and 0 <= spatial[plane[row, k]] < self.here.shape[0]
+                right = right and self.is_number(number, slots[shape, plane[row, k]])
+            if not right:
+                raise IndexError("these are not the words of an arc")
+            kept, certain = False, True
+            if radius[shape] >= 0:
+                limit = 2 * self.half[spatial[plane[row, 0]]]
+                off = self.centre_by_radius(abs(self.values[number + radius[shape]]), places, row, centre)
+                kept, certain = off <= limit, not (off < 0 or abs(off - limit) < CLOSE_CALL * limit / 2)
+            for k in range(0 if kept or not certain else 2):
+                axis = spatial[plane[row, k]]
+                word, base = slots[shape, plane[row, k]], places[row, 3, k]
+                wanted, self.read = places[row, 2, k] - base, self.values[number + word] if word >= 0 else 0.0
+                if abs(wanted - self.read) >= self.half[axis]:
+                    begun = self.size
+                    if word >= 0:
+                        first, last = self.spans[number + word, 0], self.spans[number + word, 1]
+                        certain = certain and self.put_in_style(data, first, last, wanted, self.least[axis])
+                    else:
+                        first = self.place_of(self.anchors[shape, 0], self.anchors[shape, 1], block, number)
+                        last, blank, letter = first, heads[shape, plane[row, k], 0], heads[shape, plane[row, k], 1]
+                        certain = certain and self.put_new(data, wanted, self.least[axis], blank, letter)
+                    self.note(start, stop, length, first, last, self.size - begun)
+                centre[row, k] = base + self.read
+            if certain and not kept and radius[shape] >= 0:
+                first = self.place_of(taken[shape, 0, 0], taken[shape, 0, 1], block, number)
+                last = self.place_of(taken[shape, 1, 0], taken[shape, 1, 1], block, number)
+                self.note(start, stop, length, first, last, 0)
+            clear[row] = certain
+            if not certain:
+                self.edits, self.size = edits, size
+        return 0
+
+    def is_number(self, number: int, slot: int) -> bool:
+        """Whether a slot of a block is a number in the text, or -1 for none; `number` is the first one of the block."""
+        word = number + slot
+        if slot < 0:
+            return bool(slot == -1)
+        if word >= self.values.shape[0]:
+            return False
+        return bool(0 <= self.spans[word, 0] < self.spans[word, 1] <= self.text.shape[0])
+
+    def centre_by_radius(self, radius: float, places: Floats, row: int, centre: Floats) -> float:
+        """The centre that a radius means: of the two possible ones the one nearer to the wanted centre.
+
+        Returns its distance from that, program units; infinite if the radius is less than half the chord, and -1 if it
+        is so close to it that the centre is not certain. As `block.BlockWriter._centre_by_radius`.
+        """
+        x, y = places[row, 1, 0] - places[row, 0, 0], places[row, 1, 1] - places[row, 0, 1]
+        half_chord = sqrt(x * x + y * y) / 2
+        if abs(radius - half_chord) < SEMICIRCLE:
+            return -1.0
+        if not radius > half_chord > 0:
+            return inf
+        rise, nearest = sqrt(radius * radius - half_chord * half_chord) / (2 * half_chord), inf
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            u = (places[row, 0, 0] + places[row, 1, 0]) / 2 - sign * rise * y
+            v = (places[row, 0, 1] + places[row, 1, 1]) / 2 + sign * rise * x
+            off_x, off_y = u - places[row, 2, 0], v - places[row, 2, 1]
+            off = sqrt(off_x * off_x + off_y * off_y)
+            if off < nearest:
+                nearest, centre[row, 0], centre[row, 1] = off, u, v
+        return nearest
 
     # -- single numbers -----------------------------------------------------------------------------------------------
 
@@ -295,15 +404,14 @@ class WordPrinter:
         data[self.size] = character
         self.size += 1
 
-    def put_new(self, data: Bytes, shape: int, axis: int, skip: int) -> bool:
-        """Write a missing word, its head but for `skip` characters; whether it is clear."""
-        value, decimals = self.wanted[axis], self.least[axis]
+    def put_new(self, data: Bytes, value: float, decimals: int, blank: int, letter: int) -> bool:
+        """Write a missing word: a blank (0 for none), its letter and a value; whether it is clear."""
         steps = self.steps_of(value, decimals)
         if steps < 0:
             return False
-        for k in range(skip, self.heads.shape[2]):
-            if self.heads[shape, axis, k]:
-                self.put_byte(data, self.heads[shape, axis, k])
+        if blank:
+            self.put_byte(data, blank)
+        self.put_byte(data, letter)
         negative = copysign(1.0, value) < 0
         sign = MINUS if negative else 0
         if self.signed:

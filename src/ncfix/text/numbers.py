@@ -158,13 +158,13 @@ def in_lanes(text: Bytes) -> NDArray[np.uint64]:
     return padded.view("<u8")
 
 
-def digits_of(text: Bytes, starts: Ints, stops: Ints, *, valued: bool = True) -> Digits:
+def digits_of(text: Bytes, starts: Ints, stops: Ints) -> Digits:
     """The digits of runs (of long runs, of their last sixteen bytes). See `Digits.of`."""
     lanes, lengths = in_lanes(text), stops - starts
-    found = Digits.of(eight_at(lanes, stops + WORD_BYTES), lengths, valued)
+    found = Digits.of(eight_at(lanes, stops + WORD_BYTES), lengths)
     long = np.flatnonzero(lengths > WORD_BYTES)
     if len(long):
-        found.put_before(long, Digits.of(eight_at(lanes, stops[long]), lengths[long] - WORD_BYTES, valued))
+        found.put_before(long, Digits.of(eight_at(lanes, stops[long]), lengths[long] - WORD_BYTES))
     return found
 
 
@@ -186,7 +186,7 @@ def repeated(byte: int) -> np.uint64:
     return np.uint64(int.from_bytes(bytes([byte]) * WORD_BYTES, "little"))
 
 
-ONES, TOPS, FOURS, POINTS, ZEROS, ABOVE = (repeated(byte) for byte in (0x01, 0x80, 0x0F, POINT, ord("0"), 0x76))
+ONES, TOPS, FOURS, POINTS = (repeated(byte) for byte in (0x01, 0x80, 0x0F, POINT))
 OWN = np.array([0, *((1 << 64) - (1 << 64 - 8 * count) for count in range(1, WORD_BYTES + 1))], dtype=np.uint64)
 """Masks of the `count` most significant bytes of eight, by `count`."""
 MASKS = {8: 0x00FF00FF00FF00FF, 16: 0x0000FFFF0000FFFF, 32: 0x00000000FFFFFFFF}
@@ -199,27 +199,23 @@ POWERS: Array = (10.0 ** np.arange(23)).astype(np.float64)
 class Digits:
     """The digits of runs of up to sixteen characters, as columns.
 
-    value    the digits as an integer, multiplied by ten if there is a point; 0 if not asked for
+    value    the digits as an integer, multiplied by ten if there is a point
     tail     number of characters from the point to the end, 0 without a point: the value is in units of 10^-tail
     pointed  whether there is a point; `several`: whether there are more
-    pure     whether there are only digits and points; True if the value was asked for
     """
 
     value: Ints
     tail: Ints
     pointed: Mask
     several: Mask
-    pure: Mask
 
     @classmethod
-    def of(cls, words: NDArray[np.uint64], lengths: Ints, valued: bool) -> Digits:
-        """The digits in the last `lengths` bytes of words, whose first character is the lowest byte.
+    def of(cls, words: NDArray[np.uint64], lengths: Ints) -> Digits:
+        """The digits in the last `lengths` bytes of words, which are digits and points; their lowest byte comes first.
 
-        After xor with the code of the point, a point is the only zero byte. `valued`: the words are known to be digits
-        and points, and their value is computed; else it is checked that they are.
+        After xor with the code of the point, a point is the only zero byte.
         """
-        own = OWN.take(lengths, mode="clip")
-        words &= own
+        words &= OWN.take(lengths, mode="clip")
         rest = words ^ POINTS
         points = rest - ONES
         points &= np.invert(rest, out=rest)
@@ -232,9 +228,7 @@ class Digits:
         pointed = points != 0
         tail *= pointed
         several = (points & below) != 0
-        pure = np.ones(len(words), dtype=np.bool_) if valued else others(words, own) == points
-        value = whole(words, points, below) if valued else words
-        return cls(value.view(np.int64), tail, pointed, several, pure)
+        return cls(whole(words, points, below).view(np.int64), tail, pointed, several)
 
     def put_before(self, rows: Ints, front: Digits) -> None:
         """Combine with the digits of the eight characters before those of some rows."""
@@ -245,13 +239,6 @@ class Digits:
         self.tail[rows] += np.where(first, front.tail + WORD_BYTES, 0)
         self.several[rows] |= front.several | again
         self.pointed[rows] |= front.pointed
-        self.pure[rows] &= front.pure
-
-
-def others(words: NDArray[np.uint64], own: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """The top bits of those bytes, within `own`, that are not digits."""
-    digits = words ^ ZEROS
-    return (((digits & ~TOPS) + ABOVE) | digits) & TOPS & own
 
 
 def whole(words: NDArray[np.uint64], points: NDArray[np.uint64], below: NDArray[np.uint64]) -> NDArray[np.uint64]:

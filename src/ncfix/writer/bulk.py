@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,19 +20,20 @@ from ncfix import core
 from ncfix.arrays import Array, Bytes, Ints, Mask, stops
 from ncfix.control.moves import FeedMode, Frame, MotionKind, Moves, Rule
 from ncfix.control.turns import turns_alone
-from ncfix.text.spelling import (
-    rules,
-)
+from ncfix.text.spelling import rules
 from ncfix.text.tree import Program
 from ncfix.text.writer import Splices
 from ncfix.values import mutable
-from ncfix.writer.bulk_arcs import CentreWords, OutputSteps, whole_arcs
 from ncfix.writer.bulk_layouts import CLOSING, NONE, OPENING, Layouts, places_of
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces
 from ncfix.writer.target import FrameMap
 
 SWAPPED = bytes.maketrans(b".,", b",.")
+PLANES = np.array(((1, 2), (2, 0), (0, 1)))
+"""The axes of a plane (indices of X Y Z), in the order in which their words are added, by the axis across it."""
+CIRCLE_MM = 1e-3
+"""Smallest distance of start and end of an arc written in bulk, mm: below it `BlockWriter` decides on a full circle."""
 
 
 @mutable(slots=False)
@@ -139,7 +141,7 @@ class Bulk:
             and (self.wordless[row] & (position != self.pieces.end[self.first_piece[row]])).any()
         ):
             return None
-        found = self._written(row, position, frame, self._steps_for(decimals))
+        found = self._written(row, position, frame, decimals)
         if found is None:
             return None
         ends, splices = found
@@ -148,21 +150,31 @@ class Bulk:
         return ends
 
     def turn(self, rows: Ints, ends: tuple[Array, Array], frame: FrameMap, decimals: Ints) -> tuple[Mask, Array]:
-        """Write the centre words of arcs `rows` (k,) of stretches; an arc that is not certain is taken out again.
+        """Write the centre words of arcs `rows` (k,) that `take` has written; an arc that is not certain is taken back.
 
         ends  (k, n_axes) the commands at their starts and ends, as written
 
         Returns which arcs are certain, (k,), and the centres of these, (c, 3), command coordinates, mm.
         """
-        steps, centre = self._steps_for(decimals), self.pieces.centre[self.first_piece[rows]]
-        words = CentreWords.of(self.program, self.layouts, self.moves, rows, ends, centre, frame, steps)
-        clear = words.clear
-        if not clear.all():
-            spans = self.program.blocks[words.block[~clear]]
+        program, layouts, n, each = self.program, self.layouts, len(rows), np.arange(len(rows))[:, None]
+        block, plane, columns = self.moves.block[rows], planes(self.moves, rows), spatial(self.moves)
+        centre = frame.program_point(self.pieces.centre[self.first_piece[rows]])
+        start, end = (frame.program(each_end)[each, columns[plane]] for each_end in ends)
+        fixed = layouts.fixed[program.template[block][:, None], plane] | self.moves.arc_absolute[rows, None]
+        places = np.stack((start, end, centre[each, plane], np.where(fixed, 0.0, start)), axis=1)
+        tables = layouts.centre, layouts.centre_heads, layouts.radius, layouts.taken
+        begin, stop, length = (np.empty(3 * n, dtype=np.int64) for _ in range(3))
+        printer = self._printer(np.zeros(len(self.moves.axes)), frame, decimals)
+        found, clear = np.empty((n, 2)), np.empty(n, dtype=np.uint8)
+        data = np.empty(2 * printer.room * n, dtype=np.uint8)
+        printer.write_centres(block, plane, columns, places, *tables, begin, stop, length, data, found, clear)
+        certain, edits = clear.astype(np.bool_), printer.edits
+        if not certain.all():
+            spans = program.blocks[block[~certain]]
             self.parts[:] = [part.outside(spans) for part in self.parts]
-            words = words.rows(clear)
-        self.put(words.splices(self.program, self.layouts, steps))
-        return clear, words.centre
+        self.put(Splices(begin[:edits], stop[:edits], length[:edits], data[: printer.size].tobytes()))
+        centre[each, plane] = found
+        return certain, frame.command_point(centre[certain])
 
     def alone(self, row: int, stop: int) -> list[int]:
         """The arcs from motion `row` up to `stop` that `BlockWriter` must write."""
@@ -176,21 +188,12 @@ class Bulk:
         self.parts[-1] = self.parts[-1].outside(self.program.blocks[self.moves.block[rows]])
         self.added -= int(np.diff(self.first_piece)[rows].sum()) - len(rows)
 
-    def _steps_for(self, decimals: Ints) -> OutputSteps:
-        return OutputSteps(self.text, decimals, 0.5 * 10.0 ** -decimals.astype(float), self.layouts.spelling.signed)
-
-    def _written(self, row: int, position: Array, frame: FrameMap, steps: OutputSteps) -> tuple[Array, Splices] | None:
-        """The commands at the ends of a stretch's pieces, (k, n_axes), and the changes of its axis words."""
-        words = core.loops("words")
-        stop, program, layouts = int(self.stop[row]), self.program, self.layouts
-        pieces = self.first_piece[row : stop + 1]
-        ends, axes = self.pieces.end[pieces[0] : pieces[-1]], len(position)
-        edits = (stop - row) * (axes + 1)
-        blocks = self.moves.block[row:stop]
-        start, end, length = (np.empty(edits, dtype=np.int64) for _ in range(3))
-        pen = words.WordPrinter(
+    def _printer(self, position: Array, frame: FrameMap, decimals: Ints) -> Any:
+        """What writes words in the core, from a command at which the control stands."""
+        program, layouts, axes = self.program, self.layouts, len(position)
+        return core.loops("words").WordPrinter(
             rules(),
-            steps.text,
+            self.text,
             program.blocks,
             program.first_number,
             program.template,
@@ -200,20 +203,28 @@ class Bulk:
             np.frombuffer(program.line_end, dtype=np.uint8),
             frame.frame.offset,
             frame.scale,
-            steps.decimals,
-            steps.half,
-            steps.signed,
+            decimals,
+            0.5 * 10.0 ** -decimals.astype(float),
+            layouts.spelling.signed,
             position.copy(),
             np.empty(axes),
             np.empty(axes),
             np.empty(axes, dtype=np.int64),
         )
-        commands, data = np.empty_like(ends), np.empty(self._room(pieces, blocks, axes * pen.room), dtype=np.uint8)
-        done = pen.write(blocks, ends, pieces - pieces[0], commands, start, end, length, data)
+
+    def _written(self, row: int, position: Array, frame: FrameMap, decimals: Ints) -> tuple[Array, Splices] | None:
+        """The commands at the ends of the pieces of a stretch, (k, n_axes), and the edits to its axis words."""
+        stop, printer = int(self.stop[row]), self._printer(position, frame, decimals)
+        pieces = self.first_piece[row : stop + 1]
+        ends, blocks = self.pieces.end[pieces[0] : pieces[-1]], self.moves.block[row:stop]
+        begin, end, length = (np.empty((stop - row) * (len(position) + 1), dtype=np.int64) for _ in range(3))
+        room = self._room(pieces, blocks, len(position) * printer.room)
+        commands, data = np.empty_like(ends), np.empty(room, dtype=np.uint8)
+        done = printer.write(blocks, ends, pieces - pieces[0], commands, begin, end, length, data)
         if not done:
             return None
-        edits, size = pen.edits, pen.size
-        return commands[:done], Splices(start[:edits], end[:edits], length[:edits], data[:size].tobytes())
+        edits, size = printer.edits, printer.size
+        return commands[:done], Splices(begin[:edits], end[:edits], length[:edits], data[:size].tobytes())
 
     def _room(self, pieces: Ints, blocks: NDArray[np.int32], words: int) -> int:
         """Upper bound of the bytes of words and lines of some motions; `words`: bytes of the words of a piece."""
@@ -276,6 +287,39 @@ def qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: Ints,
         fit &= np.bincount(moves.block, minlength=len(program))[moves.block] == 1
         fit[1:] &= rising
     return fit
+
+
+def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: Ints, layouts: Layouts) -> Mask:
+    """(n,) arcs that stay one arc and whose words can be written in bulk.
+
+    Arcs that `BlockWriter` writes may become more than one.
+
+    first  (n,) the first piece of each motion
+    """
+    fit: Mask = moves.kind == MotionKind.ARC
+    if not fit.any() or not {"X", "Y", "Z"} <= set(moves.axes):
+        return np.zeros(len(moves), dtype=np.bool_)
+    shapes = program.template[moves.block]
+    alone, single = layouts.alone[shapes], pieces.fraction[first] == 1
+    fit &= np.where(alone, single | layouts.further[shapes], single & pieces.arc[first])
+    fit &= layouts.round[shapes] & ((moves.modal == 20) | (moves.modal == 30))
+    rows = np.flatnonzero(fit)
+    plane = spatial(moves)[planes(moves, rows)]
+    chord = np.take_along_axis(moves.end[rows] - moves.start[rows], plane, axis=1)
+    known = np.isfinite(pieces.centre[first[rows]]).all(axis=1) | ~pieces.arc[first[rows]]
+    fit[rows] = known & (np.abs(chord) >= CIRCLE_MM).any(axis=1)
+    return fit
+
+
+def planes(moves: Moves, rows: Ints) -> Ints:
+    """(k, 2) the axes (indices of X Y Z) of the planes of arcs `rows`, in a frame that is not rotated."""
+    planes: Ints = PLANES.take(np.abs(moves.normal[rows]).argmax(axis=1), axis=0)
+    return planes
+
+
+def spatial(moves: Moves) -> Ints:
+    """The columns of X, Y and Z."""
+    return np.array([moves.axes.index(letter) for letter in "XYZ"])
 
 
 def sound(moves: Moves, pieces: Pieces, first_piece: Ints) -> Mask:

@@ -136,10 +136,6 @@ class Layouts:
             if arc.radius is not None:
                 self.radius[shape], self.taken[shape] = arc.radius
 
-    def places(self, program: Program, blocks: Ints) -> Ints:
-        """The bytes of `blocks` (k,) at which missing words go."""
-        return places_of(program, blocks, self.anchors)
-
 
 def places_of(program: Program, blocks: Ints, anchors: Ints) -> Ints:
     """The bytes of `blocks` (k,) at the anchors (s, 2) of their shapes."""
