@@ -1,9 +1,9 @@
 """The compiled core: loops over bytes, blocks, poses and motions, compiled by Cython from the modules in this folder.
 
 Each module is plain Python; the file of the same name that ends in `.pxd` gives its variables C types. So the same
-source also runs interpreted: tests hold both forms together, bit by bit. Where there is no compiled form, or where
-`NCFIX_CORE=plain` asks for that, blocks are followed and written by the interpreted one (`loops`); columns of numpy
-scan the text and do the kinematics there, with the same results. `build_core.py` compiles it.
+source also runs interpreted: tests compare both forms bit by bit. Without a compiled form, or with `NCFIX_CORE=plain`,
+blocks are followed and written by the interpreted form (`loops`), and numpy scans the text and does the kinematics,
+with the same results. `build_core.py` compiles it.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from typing import Any
 
 FOLDER = Path(__file__).parent
 WISH = "NCFIX_CORE"
-"""The environment: `plain` or `compiled`; whichever there is, if unset."""
+"""Environment variable: `plain` or `compiled`; if unset, the compiled form where there is one."""
 BUILD = "with a C compiler and Python's headers, pip install --no-cache-dir --force-reinstall --no-deps ncfix"
 
 
 class UnusableCoreError(ImportError):
-    """The form of the core that is asked for is not there."""
+    """The form of the core that was asked for does not exist, or is out of date."""
 
 
 _form: str | None = None
@@ -35,7 +35,7 @@ _said = False
 
 
 def digest(folder: Path) -> str:
-    """A digest of all sources in a folder that are compiled: an old binary must not be taken for an edited source."""
+    """A digest of all sources that are compiled, so that a binary of older sources is recognised."""
     found = sha256()
     for declarations in sorted(folder.glob("*.pxd")):
         for path in (declarations, declarations.with_suffix(".py")):
@@ -44,18 +44,18 @@ def digest(folder: Path) -> str:
 
 
 def names() -> list[str]:
-    """The modules that are compiled."""
+    """Names of the modules that are compiled."""
     return sorted(path.stem for path in FOLDER.glob("*.pxd"))
 
 
 def has_binary() -> bool:
-    """Whether a compiled form is there, of these sources or of others."""
+    """Whether there is a compiled form, of these sources or of older ones."""
     return any(FOLDER.joinpath("scan" + suffix).exists() for suffix in EXTENSION_SUFFIXES)
 
 
 @cache
 def fault() -> str:
-    """Why there is no compiled form that may be used; empty if there is one."""
+    """Why the compiled form cannot be used; empty if it can."""
     if not has_binary():
         return f"not compiled, so that long programs take up to twenty times as long: {BUILD}"
     try:
@@ -74,7 +74,7 @@ def engaged() -> bool:
 
 
 def use(form: str | None) -> None:
-    """Take the `plain` or the `compiled` form from here on; None: as the environment says.
+    """Use the `plain` or the `compiled` form from now on; None: what the environment says.
 
     Raises UnusableCoreError.
     """
@@ -94,14 +94,14 @@ def _wished() -> str:
 
 
 def status() -> str:
-    """Which form is in use and why, in one line."""
+    """One line: the form in use, and the reason."""
     if engaged():
         return "compiled"
     return fault() or f"compiled, but {WISH}=plain asks for the plain form"
 
 
 def forewarn(say: Callable[[str], object]) -> None:
-    """Say once, ahead of much work, that there is no compiled form; nothing where it is, or is not wanted."""
+    """Warn once, before much work, that there is no compiled form; silent if there is one, or a form was asked for."""
     global _said
     if not (engaged() or _said or os.environ.get(WISH)):
         _said = True
@@ -109,7 +109,7 @@ def forewarn(say: Callable[[str], object]) -> None:
 
 
 def interpreted(name: str) -> ModuleType:
-    """A module of the core as it is without a compiler, beside the compiled one."""
+    """The interpreted form of a module of the core, also where the compiled one exists."""
     full = f"ncfix.core._interpreted_{name}"
     if full not in sys.modules:
         spec = spec_from_loader(full, SourceFileLoader(full, str(FOLDER / f"{name}.py")))
@@ -121,14 +121,14 @@ def interpreted(name: str) -> ModuleType:
 
 
 def loops(name: str) -> Any:
-    """A module of the core in the form that is in use."""
+    """A module of the core in the form in use."""
     return import_module(f"ncfix.core.{name}") if engaged() else Interpreted(interpreted(name))
 
 
 class Interpreted:
-    """A module of the interpreted core, or an object that it has made, for callers that have arrays.
+    """A module of the interpreted core, or an object made by it, that can be called with arrays.
 
-    It gets memoryviews of them: these are indexed faster, and what they hold are Python's own numbers.
+    Arrays are passed on as memoryviews, which are indexed faster and yield Python numbers.
     """
 
     def __init__(self, own: Any) -> None:
@@ -145,7 +145,7 @@ class Interpreted:
 
 
 def _as_interpreted(value: Any) -> Any:
-    """What the interpreted core takes for an argument: an array, a number, or an object of its own."""
+    """An argument as the interpreted core takes it: a memoryview for an array, its own object for a wrapper."""
     if isinstance(value, Interpreted):
         return value._own
     if not hasattr(value, "__array_interface__"):

@@ -1,5 +1,5 @@
 # cython: boundscheck=False, cdivision=True
-"""Linear axes that bring the tip to a point, for many poses: as `machine.aim` and `Route.placed` do it by columns."""
+"""Inverse kinematics: positions of X Y Z that bring the tip to a goal, as `machine.aim` and `Route.placed`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 BATCH = 64
 SHIFT, TURN = 0, 1
 PARTS = 9
-"""See `core.chain`."""
+"""As in `core.chain`."""
 
 
 def aim(
@@ -33,15 +33,16 @@ def aim(
     passes: int,
     out: Array,
 ) -> int:
-    """Newton's method for all poses: as `machine.aim.aimed`, by whole steps.
+    """Solve by Newton's method for all poses, as `machine.aim.aimed` with full steps.
 
-    within, behind  the two of `route.SplitRoute`; the other functions in `batch` are of the second, then of the first
+    within, behind  the parts of a `route.SplitRoute`; the precomputed functions in `batch` are those of `behind`, then
+                    those of `within`
     axes            the columns of X, Y and Z
-    target          (3, n) mm; (3, 0): where a perfect machine has the tip
-    close, flat     when a tip has arrived, mm, and which volume of its motions is none
-    passes          how many steps there are
-    out             (6, n): positions of the axes, how far off the tip is at the beginning, mm, largest squared angles
-                    of small motions, and whether the tip has arrived
+    target          (3, n) goals, mm; (3, 0): the tips of the perfect machine
+    close, flat     distance at which a tip has arrived, mm; volume of the derivatives below which there is no solution
+    passes          largest number of steps
+    out             (6, n) receives the positions of the axes, the distance from the goal before the first step, mm, the
+                    largest squared angle of a small motion, rad^2, and 1 where the tip has arrived
     """
     n, work, tip, point = batch.n, batch.work, batch.tip, batch.spare
     ahead = batch.values + PARTS * within.steps
@@ -78,10 +79,10 @@ def aim(
 
 
 def set_out(steps: RouteSteps, axes: Ints, batch: PoseBatch, count: int, flat: float) -> int:
-    """Put down how the tips follow the axes; how many can be brought to their goals at all.
+    """Prepare the steps of a batch; returns how many of its poses have a solution.
 
-    Of the rows to spare, four are the goals, and the largest squared angle behind them; nine what takes a gap of the
-    tip to positions of the axes; and one the size of the gap before, mm, -1 if the axes cannot bring the tip there.
+    The spare rows of the batch hold the goals and the largest squared angle (4 rows), the inverse of the derivative of
+    the tip (9), and the size of the previous gap, mm (1): -1 where there is no solution.
     """
     work, point, back, before, whole, total = (
         batch.work,
@@ -119,7 +120,7 @@ def set_out(steps: RouteSteps, axes: Ints, batch: PoseBatch, count: int, flat: f
 
 
 def step_closer(axes: Ints, close: float, begins: bool, batch: PoseBatch, count: int, begin: int, out: Array) -> int:
-    """Move the axes against the gaps of the tips; how many have arrived with that."""
+    """Take one Newton step; returns how many tips have arrived with it."""
     work, gap, point, back, last, arrived = batch.work, batch.tip, batch.spare, batch.spare + 4, batch.spare + 13, 0
     for i in range(3):
         for k in range(count):
@@ -147,10 +148,11 @@ def step_closer(axes: Ints, close: float, begins: bool, batch: PoseBatch, count:
 
 
 def placed(perfect: RouteSteps, batch: PoseBatch, axes: Ints, ways_back: Array, target: Array, out: Array) -> int:
-    """Where linear axes have to be for all tips to be at `target` (3, n) mm, out (3, n): as `Route.placed`.
+    """Positions of X Y Z of a perfect machine with the tips at `target` (3, n) mm, as `Route.placed`.
 
-    axes       the columns of X, Y and Z; no rotary axis stands between them
-    ways_back  (3, 3) what takes a way of the tip to one of the axes
+    axes       the columns of X, Y and Z; no rotary axis is between them in the chain
+    ways_back  (3, 3) maps displacements of the tip to displacements of the axes
+    out        (3, n) receives the positions, mm
     """
     work, tip, point, n, first = batch.work, batch.tip, batch.spare, batch.n, perfect.steps
     right = batch.fits(perfect, 0) and axes.shape[0] == 3 and ways_back.shape[0] == ways_back.shape[1] == 3
@@ -197,5 +199,5 @@ def placed(perfect: RouteSteps, batch: PoseBatch, axes: Ints, ways_back: Array, 
 
 
 def is_one_of(axis: int, axes: Ints) -> bool:
-    """Whether a column is that of X, Y or Z."""
+    """Whether a column is one of X, Y and Z."""
     return bool(axis == axes[0] or axis == axes[1] or axis == axes[2])

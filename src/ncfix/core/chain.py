@@ -1,12 +1,12 @@
 # cython: boundscheck=False, cdivision=True
-"""The tool tip carried through a machine, for many poses: as `machine.steps` and `machine.chain` do it by columns.
+"""Forward kinematics: the tool tip of a machine at many poses, as `machine.steps` and `machine.chain` compute it.
 
-The operations and their order are the same, and sines come from numpy in both, so that the results are the same to the
-last bit; a test holds them together. Poses are taken in batches, so that what is worked out for them stays in the
-processor's cache, and so that sums are loops over poses, which a compiler turns into vector instructions.
+The operations and their order are those of the numpy code, and both take their sines from numpy, so the results agree
+to the last bit; a test compares them. Poses are processed in batches: intermediate values stay in the processor's
+cache, and the inner loops run over the poses of a batch, so that a compiler can vectorise them.
 
-No index is looked at again inside: `RouteSteps` and `PoseBatch` look at all of them before. Quotients of whole numbers
-are written with points: Cython makes a whole number of `1 / 6`.
+Array bounds are checked once, by `RouteSteps`, `PoseBatch` and the functions that Python calls; inner loops do not check
+them again. Constant quotients are written with decimal points, because `1 / 6` is an integer division in C.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
 
 BATCH = 64
+"""Poses processed at a time."""
 SPARE = 14
-"""Rows for those who do more with a batch of poses."""
+"""Rows of a batch that are free for callers (`core.aim` keeps its goals and gaps there)."""
 SHIFT, TURN, FORTH, BACK = 0, 1, 2, 3
 POWERS, WAVES, GIVEN = 0, 1, 2
 PARTS = 9
@@ -30,9 +31,10 @@ PARTS = 9
 
 
 class RouteSteps:
-    """The numbers of `machine.steps.Steps` and `Functions`, by their names there; `signal_axis` is that of functions.
+    """The steps from tool tip to workpiece, with the fields of `machine.steps.Steps` and `machine.steps.Functions`.
 
-    axes, turns, given  rows of positions and of sines that it needs, and functions that come from elsewhere
+    signal_axis         `axis` of `Functions`
+    axes, turns, given  how many rows of positions, of sines and of precomputed functions a batch must have for it
     """
 
     def __init__(
@@ -86,10 +88,10 @@ class RouteSteps:
         if not right:
             raise IndexError("these are not the steps of a route")
 
-    # -- what is done to a batch ------------------------------------------------------------------------------------
+    # -- operations on a batch --------------------------------------------------------------------------------------
 
     def set_off(self, batch: PoseBatch, count: int, tip: int) -> int:
-        """Where the tips of a batch of poses are before all steps, in rows from `tip` on: as `steps.at_tip`."""
+        """Write the tips of a batch before all steps into the rows from `tip` on, as `steps.at_tip`."""
         work, length = batch.work, batch.length
         x, y, z = self.start[0], self.start[1], self.start[2]
         u, v, w = self.start[3], self.start[4], self.start[5]
@@ -99,9 +101,9 @@ class RouteSteps:
         return 0
 
     def carry(self, batch: PoseBatch, count: int, tip: int, values: int, stop: int) -> int:
-        """Where points of a batch of poses go up to a step, rows from `tip` on: as `steps.carried`.
+        """Move the points in the rows from `tip` on through the first `stop` steps, as `steps.carried`.
 
-        values  the first row of the numbers of small motions
+        values  first row of the translations and rotations of the small motions
         """
         work = batch.work
         for i in range(stop):
@@ -131,7 +133,7 @@ class RouteSteps:
         return 0
 
     def turn(self, batch: PoseBatch, i: int, count: int, tip: int, sense: float) -> int:
-        """Turn points about the axis of step i, back if `sense` is -1: as `steps.turned`."""
+        """Rotate points about the axis of step i, backwards if `sense` is -1, as `steps.turned`."""
         work, j, sine, versine = batch.work, 3 * i, batch.sine + self.axis[i], batch.versine + self.axis[i]
         dx, dy, dz = self.direction[j], self.direction[j + 1], self.direction[j + 2]
         px, py, pz = self.point[j], self.point[j + 1], self.point[j + 2]
@@ -147,7 +149,7 @@ class RouteSteps:
         return 0
 
     def nudge_forth(self, batch: PoseBatch, i: int, count: int, tip: int, at: int) -> int:
-        """Move points by the small motion of step i about one point: as `steps.moved_forth`."""
+        """Apply the small motion of step i about its centre to points, as `steps.moved_forth`."""
         work, a, b, c = batch.work, self.center[3 * i], self.center[3 * i + 1], self.center[3 * i + 2]
         for k in range(count):
             u, v, w = work[at + 3, k], work[at + 4, k], work[at + 5, k]
@@ -165,7 +167,7 @@ class RouteSteps:
         return 0
 
     def nudge_back(self, batch: PoseBatch, i: int, count: int, tip: int, at: int) -> int:
-        """Undo that: as `steps.moved_back`."""
+        """Apply the inverse of the small motion of step i to points, as `steps.moved_back`."""
         work, a, b, c = batch.work, self.center[3 * i], self.center[3 * i + 1], self.center[3 * i + 2]
         for k in range(count):
             u, v, w = -work[at + 3, k], -work[at + 4, k], -work[at + 5, k]
@@ -183,7 +185,7 @@ class RouteSteps:
         return 0
 
     def screw(self, batch: PoseBatch, i: int, count: int, tip: int, at: int) -> int:
-        """Move points by a small motion with rotations about several points, or about one that is carried."""
+        """Apply a small motion with several centres, or one that a rotary axis moves, or its inverse."""
         work, j, axis, forth = batch.work, 3 * i, self.axis[i], self.kind[i] == FORTH
         dx, dy, dz = self.direction[j], self.direction[j + 1], self.direction[j + 2]
         px, py, pz = self.point[j], self.point[j + 1], self.point[j + 2]
@@ -222,7 +224,7 @@ class RouteSteps:
         return 0
 
     def set_goal(self, batch: PoseBatch, count: int, target: Array, begin: int, point: int) -> int:
-        """Put down where the tips shall be: at `target` (3, n) mm, or (3, 0) where these steps take them."""
+        """Write the goals of the tips: `target` (3, n) mm or, if that is (3, 0), the tips by these steps."""
         work = batch.work
         if target.shape[1]:
             for k in range(count):
@@ -234,10 +236,12 @@ class RouteSteps:
         return 0
 
     def work_out(self, batch: PoseBatch, count: int, used: int, values: int) -> int:
-        """The numbers of the small motions, rows from `values` on: as `steps.work_out_functions` and `add_up`.
+        """Compute translations and rotations of the small motions, as `steps.work_out_functions` and `add_up`.
 
-        The tips lend their room to it. `used`: how many of the functions from elsewhere are for other routes; those
-        after them are added to it.
+        values  first row of the results
+        used    how many of the precomputed functions belong to other routes
+
+        Returns `used` plus the functions used here. The rows of the tips serve as scratch space.
         """
         work, found, last = batch.work, batch.found, -1
         for g in range(self.family.shape[0]):
@@ -262,7 +266,7 @@ class RouteSteps:
         return used
 
     def powers(self, batch: PoseBatch, g: int, count: int) -> int:
-        """Powers of a position."""
+        """Compute the powers of a position that group g of the functions needs."""
         work, u, value, axis, at, power = batch.work, batch.tip, batch.tip + 1, self.signal_axis[g], 5 * g, 1
         unit, low, high = self.signal[at], self.signal[at + 1], self.signal[at + 2]
         center, scale = self.signal[at + 3], self.signal[at + 4]
@@ -284,7 +288,7 @@ class RouteSteps:
         return 0
 
     def waves(self, batch: PoseBatch, g: int, count: int) -> int:
-        """Harmonics of an angle."""
+        """Compute the cosines and sines of multiples of an angle that group g of the functions needs."""
         work, tip, axis, order = batch.work, batch.tip, self.signal_axis[g], 1
         sine, versine = batch.sine + axis, batch.versine + axis
         for k in range(count):
@@ -303,7 +307,7 @@ class RouteSteps:
         return 0
 
     def follow(self, batch: PoseBatch, column: int, count: int, way: int) -> int:
-        """How the tips of a batch follow a linear axis, mm per mm, rows from `way` on: as `steps.follows`."""
+        """Write the derivative of the tips by a linear axis, mm per mm, into rows from `way` on, as `steps.follows`."""
         work, found = batch.work, False
         for k in range(count):
             work[way, k], work[way + 1, k], work[way + 2, k] = 0.0, 0.0, 0.0
@@ -327,13 +331,16 @@ class RouteSteps:
 
 
 class PoseBatch:
-    """Many poses in columns, and room for what is worked out for a batch of them.
+    """Poses as columns, and working space for one batch of them.
 
-    q              (n_axes, n) positions
-    sine, versine  (k, n) of rotary axes; as numbers the first of their rows in `work`
-    others         functions that come from elsewhere
-    length         (n,) or (1,) of the tool, mm
-    work           room, see `rows_for`; positions come first
+    q              (n_axes, n) axis positions, mm and rad
+    sine, versine  (k, n) of rotary axes: sin(angle) and 1 - cos(angle)
+    others         (m, n) precomputed functions
+    length         (n,) or (1,) tool lengths, mm
+    work           working space, (rows, BATCH) with the rows that `rows_for` gives; positions come first
+
+    The attributes `sine`, `versine`, `others`, `found` (functions), `values` (small motions), `tip`, `length` and
+    `spare` are the first rows of these quantities in `work`.
     """
 
     def __init__(
@@ -363,12 +370,12 @@ class PoseBatch:
             raise IndexError("there are not as many of everything as there are poses")
 
     def fits(self, route: RouteSteps, given: int) -> bool:
-        """Whether all rows are there that a route needs; `given` functions from elsewhere are for other routes."""
+        """Whether there are all rows a route needs; `given` of the precomputed functions belong to other routes."""
         rows = route.axes <= self.q.shape[0] and route.turns <= self.sines.shape[0]
         return bool(rows and route.given <= self.given.shape[0] - given and route.functions <= self.values - self.found)
 
     def take_up(self, begin: int, count: int) -> int:
-        """Put a batch of poses next to each other."""
+        """Copy the poses from `begin` on into the working space."""
         for i in range(self.q.shape[0]):
             for k in range(count):
                 self.work[i, k] = self.q[i, begin + k]
@@ -387,17 +394,17 @@ class PoseBatch:
 
 
 def rows_for(axes: int, turns: int, others: int, functions: int, small: int) -> int:
-    """Rows of `BATCH` numbers that the room of a `PoseBatch` has.
+    """Number of rows of the working space of a `PoseBatch`.
 
     axes, turns, others  rows of `q`, `sine` and `others`
-    functions, small     functions of a route, and small motions of all routes; what none of the functions of a route
-                         adds to has to stay zero
+    functions, small     functions of a route, and small motions of all routes; components that no function contributes
+                         to must stay zero
     """
     return axes + 2 * turns + others + functions + PARTS * small + 5 + SPARE
 
 
 def tips(route: RouteSteps, batch: PoseBatch, out: Array) -> int:
-    """The tips of all poses: out (4, n) are x, y, z in mm, and the largest squared angle of a small motion."""
+    """Compute the tips of all poses: `out` (4, n) receives x, y, z, mm, and the largest squared small angle, rad^2."""
     if (
         not batch.fits(route, 0)
         or out.shape[0] != 4
@@ -422,12 +429,12 @@ def tips(route: RouteSteps, batch: PoseBatch, out: Array) -> int:
 def gaps(
     perfect: RouteSteps, real: RouteSteps, batch: PoseBatch, target: Array, sides: Ints, out: Array, angle: Array
 ) -> int:
-    """How far the tips of all poses are from where they shall be: out (k, n, 3) mm.
+    """Compute the gaps between tips and goals: `out` (k, n, 3) receives tip minus goal, mm.
 
-    batch    n poses as they are meant, and others behind them, n of each kind
-    target  (3, n) mm; (3, 0): where a perfect machine has the tip as meant
-    sides   (k,) which kind each of the results is of
-    angle   (k, n) the largest squared angle of a small motion
+    batch   several sets of n poses each, the programmed poses first
+    target  (3, n) goals, mm; (3, 0): the tips of the perfect machine at the programmed poses
+    sides   (k,) the set of poses of each result
+    angle   (k, n) receives the largest squared angle of a small motion, rad^2
     """
     n, work, tip, point = out.shape[1], batch.work, batch.tip, batch.spare
     right = batch.fits(perfect, 0) and batch.fits(real, 0) and batch.tip - batch.values >= PARTS * real.steps

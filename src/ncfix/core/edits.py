@@ -1,5 +1,5 @@
 # cython: boundscheck=False
-"""Edits put into a text, and a text compared with what edits were to make of it; every span is checked first."""
+"""Applies edits to a text, and checks that a text differs from another one by its edits only."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ OTHER_LENGTH = "the text has another length than its room"
 
 
 def spliced(source: Bytes, start: Ints, stop: Ints, length: Ints, data: Bytes, out: Bytes) -> int:
-    """Put a text into `out` with edits made that are as in `writer.Splices`.
+    """Write the text with its edits, columns as in `text.writer.Splices`, into `out`.
 
-    Raises IndexError for edits that overlap or lie outside, and for another length of `out` than the text has then.
+    Raises IndexError for edits that overlap or lie outside the text, and if `out` has not the length of the result.
     """
     if not start.shape[0] == stop.shape[0] == length.shape[0]:
         raise IndexError("not as many of everything as there are edits")
@@ -44,7 +44,7 @@ def spliced(source: Bytes, start: Ints, stop: Ints, length: Ints, data: Bytes, o
 
 
 def left_alone(old: Bytes, new: Bytes, start: Ints, stop: Ints, length: Ints) -> bool:
-    """Whether all between some edits, as in `Splices`, is the same in the text that they make of the old one.
+    """Whether the new text differs from the old one at most where the edits are, columns as in `text.writer.Splices`.
 
     Raises IndexError as `spliced` does.
     """

@@ -1,11 +1,9 @@
 # cython: boundscheck=False
-"""Loops over blocks and motions, one after the other.
+"""Loops over blocks and motions: positions, arc angles, splitting, limits, deviation bounds and tip errors.
 
-They do what the columns of `control.lanes`, `compensate.plan` and `compensate.figures` do, operation by operation, so
-that the results are the same; a test holds them together.
-
-No index is looked at again inside: each function looks at the sizes of what it is given, and at numbers that say where
-to look in that.
+They repeat the numpy code of `control.lanes`, `compensate.plan` and `compensate.figures` operation by operation, so the
+results agree; a test compares them. Each function checks the sizes of its arrays, and indices that it takes from them,
+before it uses them.
 """
 
 from __future__ import annotations
@@ -45,14 +43,14 @@ def followed(
     coded: Bytes,
     mask: Ints,
 ) -> int:
-    """What the k blocks of a stretch say, and where they lead: as `block_rows.followed`.
+    """Follow the k blocks of a stretch: positions, feeds and motion codes, as `block_rows.followed`.
 
-    numbers, first, shapes        of the program; the first number and the shape of each block (k,)
+    numbers, first, shapes        numbers of the program; first number and shape of each block (k,)
     slots, feeds, motions, masks  `axes`, `feed`, `motion`, `mask` of `LaneTables`
-    position                      the command before the first block (letters,)
-    unit, feed, motion            what the number of F counts, feed and motion code in force
-    offset, scale, incremental    the frame (letters,), and whether words are increments
-    path, feed_of, fed, motion_of, coded, mask  room for what `BlockRows` holds
+    position                      (letters,) command before the first block
+    unit, feed, motion            unit of F; feed and motion code in force before the first block
+    offset, scale, incremental    (letters,) the frame; whether words are increments
+    path, feed_of, fed, motion_of, coded, mask  receive the columns of `BlockRows`
     """
     letters, n, known = position.shape[0], first.shape[0], slots.shape[0]
     least = min(shapes.shape[0], path.shape[0] - 1, feed_of.shape[0], fed.shape[0], motion_of.shape[0], coded.shape[0])
@@ -91,9 +89,10 @@ TURN = 2 * pi
 
 
 def sweeps(centre: Array, step: Array, clockwise: Bytes, fuzz: float, out: Array) -> int:
-    """The signed angles of arcs with centres and ends (k, 2) relative to their starts: as `arcs.sweep_angle`.
+    """Signed angles of arcs, rad, as `arcs.sweep_angle`.
 
-    fuzz  `arcs.FUZZ`
+    centre, step  (k, 2) centres and ends relative to the starts
+    fuzz          `arcs.FUZZ`
     """
     n = out.shape[0]
     if min(centre.shape[0], step.shape[0], clockwise.shape[0]) < n or min(centre.shape[1], step.shape[1]) < 2:
@@ -114,7 +113,7 @@ def sweeps(centre: Array, step: Array, clockwise: Bytes, fuzz: float, out: Array
 
 
 def deviation(fraction: Array, command: Array, follow: Array, a: int, b: int) -> float:
-    """The largest deviation of the straight piece from node a to node b: as `PathNodes.deviations`."""
+    """Largest deviation of the straight piece from node a to node b, mm, as `PathNodes.deviations`."""
     most = 0.0
     for node in range(a + 1, b):
         seen = node if follow.shape[0] > 1 else 0
@@ -134,9 +133,11 @@ def fewest(
     counts: Ints, fraction: Array, command: Array, follow: Array, tolerance: float, stretch: int, ends: Bytes,
     worst: Array,
 ) -> int:  # fmt: skip
-    """Mark in `ends`, all 0, which nodes end a piece; put down the largest deviation of each motion's pieces.
+    """Split motions into the fewest pieces within `tolerance`, mm, as `splitting.fewest`.
 
-    As `splitting.fewest`; `tolerance` in mm, `stretch` is `splitting.STRETCH`.
+    stretch  `splitting.STRETCH`
+    ends     all 0; receives 1 for each node at which a piece ends
+    worst    receives the largest deviation of the pieces of each motion, mm
     """
     nodes = min(fraction.shape[0], command.shape[0], ends.shape[0])
     if follow.shape[0] > 1:
@@ -192,14 +193,14 @@ def within_limits(
     jump: float,
     fuzz: float,
 ) -> bool:
-    """Whether corrected poses, and those of the program (n, axes), come near no limit and are known.
+    """Whether programmed and corrected poses (n, axes) are known and within all limits.
 
-    low, high  of each axis
-    most       its largest correction alone
-    linear     1 for a linear axis, 0 for others
-    together   largest correction of the linear axes together
-    jump       largest change of one
-    fuzz       how far on a limit is on it
+    low, high  (axes,) travel
+    most       (axes,) largest correction of each axis
+    linear     (axes,) 1 for a linear axis, 0 for a rotary one
+    together   largest length of the correction of all linear axes, mm
+    jump       largest change of that correction from one pose to the next, mm
+    fuzz       how far beyond a travel limit still counts as within
     """
     axes = linear.shape[0]
     if meant.shape[0] < done.shape[0] or min(meant.shape[1], done.shape[1]) < axes:
@@ -235,13 +236,16 @@ def bounds(
     close: float,
     bound: Array,
 ) -> int:
-    """What the deviation of the tip from pose to pose (n + 1, axes) does not exceed: as `deviation.straight_bounds`.
+    """Upper bounds of the deviation of the tip along straight motions, mm, as `deviation.straight_bounds`.
 
-    linear              1 for a linear axis, 0 for others
-    slopes, curvatures  (2, axes) of `DeviationBounds`
+    meant, done         (n + 1, axes) programmed and corrected poses between the motions
+    linear              (axes,) 1 for a linear axis, 0 for a rotary one
+    slopes, curvatures  (2, axes) those of `DeviationBounds`
     moved, turned       its `shift` and `turn`
-    least_arm           the arm with all axes at zero, mm
-    more, corner        a factor for products of errors, and `deviation.CORNER`
+    least_arm           lever arm with all axes at zero, mm
+    more, corner        `error_model.MORE`, a factor for products of errors, and `deviation.CORNER`
+    close               `aim.CLOSE`, mm
+    bound               (n,) receives the bounds
     """
     axes, arm = linear.shape[0], 0.0
     if min(meant.shape[0], done.shape[0]) <= bound.shape[0] or min(meant.shape[1], done.shape[1]) < axes:
@@ -300,21 +304,21 @@ def at_ends(
     places: Ints,
     counts: Ints,
 ) -> int:
-    """Add up the errors at the ends of motions; mark in `apart` those at the end of which they are not known.
+    """Sum up the tip errors at the ends of motions; `apart` receives 1 where they are not known here.
 
-    start, end                  of the moves (n, axes), as programmed
-    before_all, written, first  where the control stood before, commands at the ends of all pieces as written (m, axes),
-                                and the first piece of each motion (n + 1,)
-    wanted, before              commands at which the tip is where it should be (n, axes), and how far off it is without
-                                correction (n,) mm
-    features                    ways over which errors bend (axes,)
-    ways, columns, linear       the ways of X, Y and Z as columns, their columns, linear axes
+    start, end                  (n, axes) programmed commands
+    before_all, written, first  command before the first motion; written commands at the ends of all pieces (m, axes);
+                                first piece of each motion (n + 1,)
+    wanted, before              (n, axes) commands at which the tip is at its goal; (n,) mm, tip error uncorrected
+    features                    (axes,) distances over which the errors bend
+    ways, columns, linear       (3, 3) derivatives of the tip by X Y Z as columns; columns of X Y Z; linear axes
     straight, turned            `deviation.STRAIGHT`, `written.TURNED`
-    density, most               how many places inside: per bend, at most
-    shown, apart, followed      motions that figures are of, those not to be counted here, those to be looked at inside
-    sums                        way, squares times way and largest error before and after, mm
-    places                      how many ends, and where the largest are
-    counts                      at how many places inside each motion has to be looked at (n,)
+    density, most               samples per bend inside a motion, and the largest number of them
+    shown, apart, followed      (n,) motions with figures; motions counted elsewhere; motions to be sampled inside
+    sums                        receives path length, mm, the sums of squares times length and the largest error, before
+                                and after the correction
+    places                      receives the number of ends, and the motions with the largest errors
+    counts                      (n,) receives the number of samples inside each motion
     """
     n, axes, pieces = end.shape[0], linear.shape[0], written.shape[0]
     rows = min(start.shape[0], wanted.shape[0], first.shape[0] - 1, before.shape[0], shown.shape[0], apart.shape[0])

@@ -1,7 +1,7 @@
-"""The nearest point of a path, for many points, one after the other.
+"""The nearest point of a path to each of many points.
 
-It does what the columns of `compensate.figures.nearest` do, operation by operation, so that the results are the same;
-a test holds them together.
+It repeats the numpy code of `compensate.figures.nearest` operation by operation, so the results agree; a test compares
+them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class CurveColumns:
-    """What a `Curve` calls by the same names."""
+    """The fields of a `figures.curve.Curve`, by the same names."""
 
     def __init__(self, parabolas: Array, lengths: Array, ways: Array, opens: Bytes, upto: Ints, lying: Ints) -> None:
         self.parabolas, self.lengths, self.ways = parabolas, lengths, ways
@@ -27,7 +27,7 @@ class CurveColumns:
         self.share = self.gap = self.push = 0.0
 
     def place(self, way: float) -> int:
-        """The parabola in which a way ends: as `Curve.place`."""
+        """The parabola at an arc length, as `Curve.place`."""
         low, high = 0, self.lengths.shape[0]
         while low < high:
             middle = (low + high) // 2
@@ -38,16 +38,17 @@ class CurveColumns:
         return max(low - 1, 0)
 
     def hop(self, piece: int, push: float, one: bool) -> int:
-        """Where to look next: as `Search._hop`."""
+        """The parabola to be searched next, as `Search._hop`."""
         end = self.lengths[piece] + (self.ways[piece] if push > 0 else 0.0)
         at, after = self.upto[self.place(end + (0.0 if one else push))] - 1, self.upto[piece]
         at = max(at, after) if push > 0 else min(at, after - (1 if self.ways[piece] > 0 else 0) - 1)
         return int(self.lying[min(max(at, 0), self.lying.shape[0] - 1)])
 
     def newton(self, px: float, py: float, pz: float, k: int, share: float, close: float, steps: int) -> int:
-        """The nearest point of parabola k: put down its share, its distance, and how far the way to it goes on.
+        """Find the nearest point of parabola k, as `nearest._newton`.
 
-        As `nearest._newton`.
+        `share` and `gap` receive its parameter and its distance, mm; `push` how far the search points beyond the end of
+        the parabola, mm.
         """
         p = self.parabolas
         while True:
@@ -79,12 +80,13 @@ class CurveColumns:
         shares: Array,
         gaps: Array,
     ) -> int:
-        """The nearest points that are reached without going away from `points` (3, n): as `Search._down`.
+        """Descend from an expected arc length to the nearest points of the path, as `Search._down`.
 
-        expected              (n,) mm, the way along the path from where to look
+        points                (3, n) mm
+        expected              (n,) mm, arc length at which each search begins
         near, close           `Search.near` and `nearest.CLOSE`
         steps, hops           `nearest.STEPS` and `HOPS`
-        pieces, shares, gaps  room for parabolas, shares, and distances (n,) mm
+        pieces, shares, gaps  (n,) receive parabolas, parameters, and distances, mm
         """
         for row in range(expected.shape[0]):
             x, y, z, piece = points[0, row], points[1, row], points[2, row], self.place(expected[row])

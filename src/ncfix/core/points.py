@@ -1,5 +1,5 @@
 # cython: boundscheck=False, cdivision=True
-"""Points and directions after motions of a chain, many at a time: as `machine.chain` does it by columns."""
+"""Rigid motions of many points and directions, as `machine.chain` computes them."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
 
 def fit(moved: Array, weight: Array, out: Array) -> bool:
-    """Whether columns have room for results of the same shape, and a weight each."""
+    """Whether results have the shape of the points, and there is a weight for each of them."""
     same = moved.shape[0] == out.shape[0] == 3 and moved.shape[1] == out.shape[1] == weight.shape[0]
     return bool(same and moved.shape[2] == out.shape[2])
 
 
 def advanced(d: Array, p: Array, sine: Array, versine: Array, moved: Array, weight: Array, out: Array) -> int:
-    """Columns (3, m, n) of weights (m,) after a rotary axis with direction d through p has turned."""
+    """Rotate points (weight 1) and directions (weight 0), (3, m, n), about an axis with direction d through p."""
     if not (
         fit(moved, weight, out)
         and d.shape[0] == p.shape[0] == 3
@@ -41,7 +41,7 @@ def advanced(d: Array, p: Array, sine: Array, versine: Array, moved: Array, weig
 
 
 def moved_small(r: Array, t: Array, c: Array, back: bool, moved: Array, weight: Array, out: Array) -> int:
-    """Columns (3, m, n) after small motions r, t (3, n) about c (3, n): as `SmallMotion.forth`, or as its `back`."""
+    """Move points by rotations r and translations t (3, n) about c (3, n), as `SmallMotion.forth`, or as its `back`."""
     n = moved.shape[2]
     if not (
         fit(moved, weight, out)
@@ -70,7 +70,7 @@ def moved_small(r: Array, t: Array, c: Array, back: bool, moved: Array, weight: 
 
 
 def turned(r: Array, first: float, second: float, c: Array, moved: Array, weight: Array, out: Array) -> int:
-    """Columns (3, m, n) after one rotation r with its factors about c: as `SmallMotion.forth` without translation."""
+    """Rotate points by one rotation r about c, as `SmallMotion.forth`; `first`, `second`: the factors of its series."""
     if not (fit(moved, weight, out) and r.shape[0] == c.shape[0] == 3):
         raise IndexError("columns of other shapes")
     u, v, w = r[0], r[1], r[2]

@@ -1,9 +1,8 @@
 # cython: boundscheck=False, cdivision=True
-"""The scan of a text: numbers, comments and shapes of its blocks in one pass over the bytes.
+"""Scans a text: numbers, comments and shapes of its blocks in one pass over the bytes.
 
-It finds what `text.shapes.scan` finds by columns, to the last bit; a test holds the two together.
-
-No index is looked at again inside: `Scanner` looks at its tables, and `scan` at the blocks and at the room before them.
+The result is that of the numpy code of `text.shapes.scan`, to the last bit; a test compares them. `Scanner` checks the
+sizes of its tables, and `scan` those of blocks and results for each block; inner loops do not check them again.
 """
 
 from __future__ import annotations
@@ -20,29 +19,28 @@ if TYPE_CHECKING:
     Rows = NDArray[np.int32]
 
 UNTOUCHED, CRAMPED = -1, -2
-"""Instead of the number of shapes: there is a block that must be taken as it is, or more than there is room for."""
+"""Returned instead of the number of shapes: a block cannot be scanned; there is not enough room for the results."""
 NONE, BROKEN = -1, -2
 FREE, FIXED = 1, 2
-"""A number, and one that belongs to the shape."""
+"""A number that may differ between blocks of one shape, and one that is part of the shape."""
 LITERAL, NUMERIC, SIGN, COMMENT, ODD = 0, 1, 2, 3, 4
-"""Kinds of bytes: of the shape as they are, of a number, a sign, the beginning of a comment, or not to be scanned."""
+"""Kinds of bytes: part of the shape, digit or point, sign, start of a comment, or not allowed in a scanned block."""
 CHARACTER, CHILD, SIBLING, SHAPE = 0, 1, 2, 3
-"""Columns of the tree of shapes, a row for each beginning of one: its last character, the first of the rows that go on
-from it (0: none), the next row that goes on from where this one does, and the number of the shape that ends there (-1:
-none does). Row 0 is the beginning of all."""
+"""Columns of the tree of shapes, a prefix tree with a row for each prefix: its last character, its first child row (0:
+none), the next child of the same parent, and the number of the shape that ends there (-1: none). Row 0 is the root."""
 POINT, ZERO, NINE, MINUS, OPEN, CLOSE, TAIL = 46, 48, 57, 45, 40, 41, 59
 """The characters . 0 9 - ( ) ;"""
 
 
 class Scanner:
-    """What one kind of text is made of, tables of the 256 bytes.
+    """The lexical rules of a language, as tables over the 256 byte values.
 
     kinds           LITERAL, NUMERIC, SIGN, COMMENT or ODD
-    fixed           a number after these belongs to the shape
-    unsigned_after  a sign after these does not belong to the number behind it
+    fixed           bytes after which a number is part of the shape
+    unsigned_after  bytes after which a sign does not belong to the number that follows
     blank           blanks and tabs
-    blanks, digits  see `numbers.BLANKS` and `numbers.EXACT_DIGITS`
-    powers          of ten
+    blanks, digits  `numbers.BLANKS` and `numbers.EXACT_DIGITS`
+    powers          the powers of ten
     """
 
     def __init__(
@@ -73,20 +71,21 @@ class Scanner:
         behind: Ints,
         tree: Rows,
     ) -> int:
-        """Scan the n blocks (n, 2) of a text; how many shapes there are, or `UNTOUCHED`, or `CRAMPED`.
+        """Scan the blocks, spans (n, 2), of a text; returns the number of shapes, or `UNTOUCHED`, or `CRAMPED`.
 
-        The marks stand for a number, for one without a point, for the comment that ends a block.
+        In a shape the marks stand for a number, a number without a point, and the comment that ends a block.
 
-        Room for results, that of numbers and of the tree for each byte of the text, or for fewer:
+        These arrays receive the results; numbers and tree may need as many rows as the text has bytes:
 
-        group          (n,) which shape each block has
-        comment        (n,) where its last comment begins; left as it is if it has none
-        first          (n + 1,) its first number
-        spans, values  of the numbers
-        shapes         one after the other
-        starts         where each begins
-        behind         (n + 1,) the shape that came behind each when it was met last, -1 if none did without a comment
-        tree           see `CHARACTER`
+        group          (n,) the shape of each block
+        comment        (n,) where the comment at the end of the block begins; unchanged if it has none
+        first          (n + 1,) the first number of each block
+        spans, values  spans and values of the numbers
+        shapes         the shapes, one after the other
+        starts         where each shape begins
+        behind         (n + 1,) for each shape the one that followed it last time, the first guess for the next block;
+                       -1: none, or one with a comment
+        tree           the tree of shapes, see `CHARACTER`
         """
         count, known, end, latest, place, n = 0, 0, 0, 0, 0, blocks.shape[0]
         least = min(first.shape[0] - 1, starts.shape[0] - 1, behind.shape[0] - 1, group.shape[0], comment.shape[0])
@@ -175,9 +174,11 @@ class Scanner:
         spans: Ints,
         values: Floats,
     ) -> int:
-        """How many numbers there are with those of a block, if it has the shape at `at` to `end`; `NONE` if it may not.
+        """Read the numbers of a block if it has the shape from `at` to `end`, which has no comment.
 
-        The shape has no comment. `count`: numbers so far, behind which those of the block are put down.
+        count  the numbers so far; those of the block are stored after them
+
+        Returns the new count, or `NONE` if the block may have another shape.
         """
         place = begin
         while at < end and place < stop:
@@ -203,9 +204,9 @@ class Scanner:
         return count if at == end and place == stop else NONE
 
     def number(self, text: Bytes, place: int, stop: int) -> int:
-        """What the run of digits and points at a place is: `FREE`, `FIXED` or `BROKEN`.
+        """Read the run of digits and points at a place; returns `FREE`, `FIXED` or `BROKEN`.
 
-        Put down where it starts, with a sign before it, and ends, whether it has a point, and its value.
+        `start` (of its sign, if it has one), `past` (its end), `pointed` and `value` receive what was read.
         """
         past, points, decimals, mantissa = place, 0, 0, 0
         while past < stop and ZERO <= text[past] <= NINE:
@@ -238,7 +239,7 @@ class Scanner:
         return FREE
 
     def before(self, text: Bytes, place: int) -> int:
-        """Where the last character before a place is that is no blank: as `numbers.last_before`."""
+        """The last place before another that is not blank, as `numbers.last_before`."""
         at = place - 1
         least = max(at - self.blanks, 0)
         while at > least and self.blank[text[at]]:
@@ -246,7 +247,7 @@ class Scanner:
         return at
 
     def comment_end(self, text: Bytes, place: int, stop: int) -> int:
-        """Where the comment that begins at a place ends; `NONE` if none does, `BROKEN` with something odd in it."""
+        """The end of the comment that begins at a place; `NONE` if it is none, `BROKEN` if it holds an ODD byte."""
         tail = text[place] == TAIL
         for at in range(place + 1, stop):
             character = text[at]
@@ -259,13 +260,13 @@ class Scanner:
         return stop if tail else NONE
 
     def is_last(self, text: Bytes, place: int, stop: int) -> bool:
-        """Whether nothing but blanks follows in the block."""
+        """Whether only blanks follow in the block."""
         while place < stop and self.blank[text[place]]:
             place += 1
         return place == stop
 
     def child_row(self, tree: Rows, row: int, character: int) -> int:
-        """The row of a tree of shapes to which a character leads from another; a new one if none does."""
+        """The child of a row of the tree for a character; it is added if there is none."""
         at = tree[row, CHILD]
         while at and tree[at, CHARACTER] != character:
             at = tree[at, SIBLING]

@@ -1,10 +1,9 @@
 # cython: boundscheck=False, cdivision=True
-"""A stretch of corrected motions as text: one pass over its words, digits put where they belong.
+"""Writes the words of corrected motions: numbers are replaced in the text, missing words and further lines added.
 
-What `writer.block.BlockWriter` does block by block, so that the bytes are the same; a test holds the two together.
-
-No index is looked at again inside: `WordPrinter` looks at its tables, and `write` at what it uses of them for a motion
-before it writes that.
+The bytes are those that `writer.block.BlockWriter` writes block by block; a test compares them. A number is *certain* if
+a product of doubles decides its digits, see `NumberRules`; others are left to `BlockWriter`. `WordPrinter` checks the
+sizes of its tables, and `write` and `write_centres` check all indices of a motion before they write it.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ if TYPE_CHECKING:
 POINT, ZERO, MINUS, PLUS = 46, 48, 45, 43
 """The characters . 0 - +"""
 VECTOR_HEAD = 1
-"""See `writer.bulk_layouts`."""
+"""As in `writer.bulk_layouts`."""
 MOST_STEPS = 18
-"""Decimals of the finest output step that is written here."""
+"""Largest number of decimals that is written here."""
 ROOM = 16 + MOST_STEPS + 4
-"""Bytes that a word takes at most: its head, a sign, digits before the point and behind it."""
+"""Largest number of bytes of a word: blank, letter, sign, and digits before and after the point."""
 
 
 SEMICIRCLE = 1e-6
@@ -38,14 +37,14 @@ CLOSE_CALL = 1e-4
 
 
 class NumberRules:
-    """Numbers as `ncfix.text.numbers` and `ncfix.text.spelling` have them.
+    """The limits of numbers that are written here; see `ncfix.text.spelling.rules`.
 
-    powers           of ten
-    longest          bytes, but for its sign, of the longest number that is rewritten here
-    decimals         digits behind the point of the finest one
-    largest, tie     output steps from which on, and how near to the middle between two outputs, as a share of it, a
-                     value is not clear
-    rounded          half output steps by which an axis may stand off its place for nothing but rounding
+    powers    the powers of ten
+    longest   largest number of bytes, without the sign, of a number that is rewritten
+    decimals  largest number of decimals of such a number
+    largest   output steps from which on a value is not certain
+    tie       relative distance from the middle between two outputs within which a value is not certain
+    rounded   half output steps by which rounding alone may displace an axis
     """
 
     def __init__(self, powers: Floats, longest: int, decimals: int, largest: float, tie: float, rounded: float) -> None:
@@ -56,21 +55,21 @@ class NumberRules:
 
 
 class WordPrinter:
-    """Writes motions of a program into a buffer.
+    """Writes the edits of motions of a program.
 
-    text       of the program
-    edges, first, template  (n, 2) spans of its blocks, and the first number and the template of each
-    values, spans  of the numbers of the program
-    slots, by_place, by_letter, anchors, heads, leads, openings, closings  see `writer.bulk_layouts.Layouts`
-    line_end   the end of a line
-    offset     and `scale` (axes,): a command is `offset + scale * number`
-    least      (axes,) decimals that the least increment needs
-    half       (axes,) half output steps
-    signed     numbers carry signs
-    here       (axes,) where the control stands
-    room       bytes that a word takes at most
-    wanted, now, told  room (axes,): the numbers that a piece shall have, those that lead where the axes are told to go,
-               and whether they are told
+    text       text of the program
+    edges, first, template  spans (n, 2) of its blocks; first number and template of each block
+    values, spans  values and spans of its numbers
+    slots, by_place, by_letter, anchors, heads, leads, openings, closings  those of `writer.bulk_layouts.Layouts`
+    line_end   bytes that end a line
+    offset     (axes,), as `scale`: a command is `offset + scale * number`
+    least      (axes,) decimals of the output step
+    half       (axes,) half an output step, program units
+    signed     positive numbers have a plus sign
+    here       (axes,) current command of the control
+    wanted, now, told  (axes,) scratch space: numbers wanted at the end of a piece, numbers that the text gives there,
+               and whether a word gives them
+    room       largest number of bytes of a word
     """
 
     def __init__(
@@ -136,13 +135,13 @@ class WordPrinter:
         self, rows: Rows, ends: Floats, pieces: Ints, commands: Floats, start: Ints, stop: Ints, length: Ints,
         data: Bytes,
     ) -> int:  # fmt: skip
-        """Write motions up to the first one that is not clear; how many pieces are written.
+        """Write motions up to the first one that is not certain; returns the number of pieces written.
 
-        rows      (k,) their blocks
-        ends      (m, axes) commands at the ends of their pieces
-        pieces    (k + 1,) the first piece of each motion, and m
-        commands  room for the commands at the ends of the pieces written
-        start, stop, length, data  room for what changes in the source, as in `Splices`; see `edits` and `size`
+        rows      (k,) the block of each motion
+        ends      (m, axes) wanted commands at the ends of their pieces
+        pieces    (k + 1,) first piece of each motion, and m
+        commands  receives the commands at the ends of the pieces, as written
+        start, stop, length, data  receive the edits, as in `text.writer.Splices`: `edits` of them, `size` bytes
         """
         done, axes, room = 0, self.here.shape[0], min(start.shape[0], stop.shape[0], length.shape[0])
         if pieces.shape[0] <= rows.shape[0] or ends.shape[1] != axes or commands.shape[1] != axes:
@@ -189,7 +188,7 @@ class WordPrinter:
         return done
 
     def fits(self, block: int, shape: int, number: int) -> bool:
-        """Whether a block, its words, and the places where others go lie in the text."""
+        """Whether a block, its axis words, and the places for added words are within the text."""
         text, begin, end = self.text.shape[0], self.edges[block, 0], self.edges[block, 1]
         if not (0 <= begin <= end <= text and 0 <= shape < self.slots.shape[0] and number >= 0):
             return False
@@ -203,13 +202,13 @@ class WordPrinter:
         return bool(min(first, last) >= -2 and number + max(first, last) < self.spans.shape[0])
 
     def most(self, block: int, shape: int, number: int, further: int) -> int:
-        """Bytes that the motion of a block and so many further pieces take at most."""
+        """Largest number of bytes of the motion of a block and its `further` pieces."""
         lead = self.place_of(self.leads[shape, 0], self.leads[shape, 1], block, number) - self.edges[block, 0]
         around = self.line_end.shape[0] + self.openings.shape[1] + self.closings.shape[1]
         return int((further + 1) * (self.here.shape[0] * ROOM + around) + further * max(lead, 0))
 
     def arrive(self, commands: Floats, piece: int) -> None:
-        """Commands of the numbers `now` of axes that were told to move; the others stay `here`."""
+        """Store the command at the end of a piece: axes with a word are where it says, the others stay `here`."""
         for axis in range(self.here.shape[0]):
             if self.told[axis]:
                 commands[piece, axis] = self.now[axis] * self.scale[axis] + self.offset[axis]
@@ -217,19 +216,19 @@ class WordPrinter:
                 commands[piece, axis] = self.here[axis]
 
     def place_of(self, slot: int, beyond: int, block: int, number: int) -> int:
-        """The byte that an anchor of a block stands for; `number` is its first one."""
+        """The byte of an anchor (slot and offset `beyond`) of a block; `number` is the first number of the block."""
         place = self.spans[number + slot, 1] if slot >= 0 else self.edges[block, -1 - slot]
         return int(beyond + place)
 
     def note(self, start: Ints, stop: Ints, length: Ints, begin: int, end: int, size: int) -> None:
-        """Note an edit."""
+        """Store an edit that replaces the bytes from `begin` to `end` by `size` bytes."""
         start[self.edits], stop[self.edits], length[self.edits] = begin, end, size
         self.edits += 1
 
     def rewrite_words(
         self, number: int, shape: int, several: bool, start: Ints, stop: Ints, length: Ints, data: Bytes
     ) -> bool:
-        """Write the words of a block anew whose values change, all if `several` pieces follow; whether it is clear."""
+        """Rewrite words whose values change, or all if there are `several` pieces; returns whether they are certain."""
         for k in range(self.by_place.shape[1]):
             axis = self.by_place[shape, k]
             if axis < 0:
@@ -245,7 +244,7 @@ class WordPrinter:
         return True
 
     def add_words(self, place: int, shape: int, start: Ints, stop: Ints, length: Ints, data: Bytes) -> bool:
-        """Add words at `place` for axes that must move and have none; whether that is clear."""
+        """Add words at `place` for axes that must move and have none; returns whether they are certain."""
         for k in range(self.by_letter.shape[0]):
             axis, begun = self.by_letter[k], self.size
             if self.heads[shape, axis, 1] == VECTOR_HEAD:
@@ -265,10 +264,10 @@ class WordPrinter:
         return True
 
     def put_line(self, lead_from: int, lead_to: int, shape: int, data: Bytes) -> bool:
-        """Write a further piece of a motion on a line of its own, and take the axes there; whether that is clear.
+        """Write a further piece of a motion on a line of its own; returns whether it is certain.
 
-        A piece that moves nothing is not: it is for `BlockWriter` to say. The line repeats the bytes of the text from
-        `lead_from` to `lead_to`.
+        The line repeats the bytes from `lead_from` to `lead_to` of the text. A piece that moves no axis is left to
+        `BlockWriter`.
         """
         for k in range(self.line_end.shape[0]):
             self.put_byte(data, self.line_end[k])
@@ -312,7 +311,7 @@ class WordPrinter:
         slots, heads, radius, taken  `centre`, `centre_heads`, `radius` and `taken` of `writer.bulk_layouts.Layouts`
         start, stop, length, data  room for the edits, as in `write`
         centre   (k, 2) receives the centre that the text means, program units
-        clear    (k,) receives 1, or 0 for an arc that is left to `BlockWriter`: nothing is written of it
+        clear    (k,) receives 1, or 0 for an arc that is not certain: nothing is written of it
         """
         n, shapes = rows.shape[0], self.slots.shape[0]
         right = min(slots.shape[0], heads.shape[0], radius.shape[0], taken.shape[0]) >= shapes
@@ -400,12 +399,12 @@ class WordPrinter:
     # -- single numbers -----------------------------------------------------------------------------------------------
 
     def put_byte(self, data: Bytes, character: int) -> None:
-        """Write a character."""
+        """Append a character."""
         data[self.size] = character
         self.size += 1
 
     def put_new(self, data: Bytes, value: float, decimals: int, blank: int, letter: int) -> bool:
-        """Write a missing word: a blank (0 for none), its letter and a value; whether it is clear."""
+        """Append a new word: blank (0 for none), letter and value; returns whether it is certain. Sets `read` to it."""
         steps = self.steps_of(value, decimals)
         if steps < 0:
             return False
@@ -421,9 +420,9 @@ class WordPrinter:
         return True
 
     def put_in_style(self, data: Bytes, start: int, stop: int, value: float, least: int) -> bool:
-        """Write a value in the style of the number at a span, as `NumberStyle.write`; whether that is clear.
+        """Append a value in the style of the number at a span, as `NumberStyle.write`; returns whether it is certain.
 
-        Put down what a reader makes of it.
+        `read` receives the value that the text means.
         """
         if not self.style_of(start, stop):
             return False
@@ -443,9 +442,10 @@ class WordPrinter:
         return True
 
     def style_of(self, start: int, stop: int) -> bool:
-        """Decimals, point, plus, digits before the point of the number at a span; whether it is nothing but that.
+        """Determine the style of the number at a span; returns whether it consists of sign, digits and point only.
 
-        Where numbers carry signs a minus counts as a plus, too: what had a sign keeps one.
+        `own` (decimals), `point`, `plus` and `whole` (digits before the point) receive it. In signed numbers a minus
+        counts as a plus, so that the new number keeps a sign.
         """
         head, first, point = self.text[start], start, -1
         if head in (PLUS, MINUS):
@@ -462,7 +462,7 @@ class WordPrinter:
         return stop - first <= self.rules.longest and self.own <= self.rules.decimals
 
     def steps_of(self, value: float, decimals: int) -> int:
-        """The output steps of a number; -1 where it is too large, or too near to the middle between two outputs."""
+        """The absolute value in output steps, rounded; -1 if it is too large, or too close to a tie of rounding."""
         if decimals > MOST_STEPS:
             return -1
         size = abs(value) * self.rules.powers[decimals]
@@ -475,7 +475,7 @@ class WordPrinter:
         return steps + 1 if rest > 0.5 else steps
 
     def put(self, data: Bytes, steps: int, decimals: int, sign: int, least: int, point: bool) -> None:
-        """Write a number of so many output steps; `least`: digits before the point, -1 for none if it is zero."""
+        """Append a number of output steps with at least `least` digits before the point; -1: none if it is zero."""
         if sign:
             self.put_byte(data, sign)
         count, rest = 0, steps
