@@ -1,8 +1,8 @@
 # cython: boundscheck=False, cdivision=True
 """Writes the words of corrected motions: numbers are replaced in the text, missing words and further lines added.
 
-The bytes are those that `writer.block.BlockWriter` writes block by block; a test compares them. A number is *certain* if
-a product of doubles decides its digits, see `NumberRules`; others are left to `BlockWriter`. `WordPrinter` checks the
+The bytes are those that `writer.block.BlockWriter` writes block by block; a test compares them. A number is *certain*
+if a product of doubles decides its digits, see `NumberRules`; others are left to `BlockWriter`. `WordPrinter` checks the
 sizes of its tables, and `write` and `write_centres` check all indices of a motion before they write it.
 """
 
