@@ -5,8 +5,8 @@ The operations and their order are those of the numpy code, and both take their 
 to the last bit; a test compares them. Poses are processed in batches: intermediate values stay in the processor's
 cache, and the inner loops run over the poses of a batch, so that a compiler can vectorise them.
 
-Array bounds are checked once, by `RouteSteps`, `PoseBatch` and the functions called from Python; inner loops do not check
-them again. Constant quotients are written with decimal points, because `1 / 6` is an integer division in C.
+Array bounds are checked once, by `RouteSteps`, `PoseBatch` and the functions called from Python, and not again in inner
+loops. Constant quotients are written with decimal points, because `1 / 6` is an integer division in C.
 """
 
 from __future__ import annotations

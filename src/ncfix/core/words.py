@@ -2,8 +2,8 @@
 """Writes the words of corrected motions: numbers are replaced in the text, missing words and further lines added.
 
 The bytes are those that `writer.block.BlockWriter` writes block by block; a test compares them. A number is *certain*
-if a product of doubles decides its digits, see `NumberRules`; others are left to `BlockWriter`. `WordPrinter` checks the
-sizes of its tables, and `write` and `write_centres` check all indices of a motion before they write it.
+if a product of doubles decides its digits, see `NumberRules`; others are left to `BlockWriter`. `WordPrinter` checks
+the bounds of its tables, `write` and `write_centres` those of a motion before they write it.
 """
 
 from __future__ import annotations
