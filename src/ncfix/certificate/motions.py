@@ -281,7 +281,7 @@ class MotionJudge(Deviations):
             if aside:
                 return BY_VECTOR
             if pair.row in self.begin_apart:
-                return "the way of a motion that begins elsewhere with block delete"
+                return "the way of a motion that may begin at several places"
             if (turn >= HALF_TURN)[self.machine.rotary & (high - low >= 2 * math.pi)].any():
                 return "a rotary axis may go the other way round"
         if self.strategy == "full" or self.machine.depends_on_direction:

@@ -70,12 +70,13 @@ class FigureTally:
         self.samples = 0
 
     def add(self, part: PathSamples) -> None:
-        """Add a batch of samples. Samples with an unknown error (NaN) count as zero, and not in `samples`."""
-        self.way += float(part.weight.sum())
+        """Add a batch of samples, except those with an unknown error (NaN)."""
+        weight = np.where(np.isfinite(part.before) & np.isfinite(part.after), part.weight, 0.0)
+        self.way += float(weight.sum())
         self.samples += int(np.count_nonzero(np.isfinite(part.after)))
         for side, error in enumerate((part.before, part.after)):
             known = np.nan_to_num(error)
-            self.squares[side] += float((part.weight * known**2).sum())
+            self.squares[side] += float((weight * known**2).sum())
             best = int(known.argmax())
             there = float(known[best]), int(part.move[best]), float(part.fraction[best])
             self.at[side] = max(self.at[side], there, key=_early)

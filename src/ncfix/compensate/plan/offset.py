@@ -159,8 +159,7 @@ def beside_contours(intent: Intent, real: Segments) -> OffsetPoints | None:
 def _along(intent: Intent, real: Segments, rows: Index, meant: ContactPath, done: ContactPath) -> OffsetPoints:
     """Errors of the tool beside the motions, from their start to their end."""
     counts, fraction = interior(intent, real, rows, LOOKS, LEAST)
-    own, fraction = owners(counts), fraction
-    own = np.concatenate([own, np.arange(len(rows)), np.arange(len(rows))])
+    own = np.concatenate([owners(counts), np.arange(len(rows)), np.arange(len(rows))])
     fraction = np.concatenate([fraction, np.zeros(len(rows)), np.ones(len(rows))])
     move = rows[own]
     places = [each.at(move, fraction) for each in (intent.segments, real)]
