@@ -174,6 +174,14 @@ def test_errors_that_grow_below_the_tolerance_are_said(root: Path) -> None:
         assert (report.error_after_um["max"] > report.error_before_um["max"]) == grows
 
 
+def test_a_sample_whose_error_is_not_known_has_no_part_in_the_mean() -> None:
+    error, weight = np.array([3.0, np.nan, 3.0]), np.array([1.0, 5.0, 1.0])
+    tally = FigureTally()
+    tally.add(PathSamples(np.arange(3), np.ones(3), error, error, weight))
+    found = tally.result()
+    assert (found.before.rms, found.after.rms, found.way, found.samples) == (3.0, 3.0, 2.0, 2)
+
+
 def test_of_equal_errors_the_first_on_the_path_is_named() -> None:
     """In whatever order they come: of a part of plain motions those at ends come before those along the way."""
     tally, one = FigureTally(), np.ones(1)
