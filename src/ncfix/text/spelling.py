@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ncfix import core
-from ncfix.text.numbers import WORD_BYTES, POWERS
+from ncfix.text.numbers import POWERS, WORD_BYTES
 from ncfix.values import frozen
 
 if TYPE_CHECKING:
@@ -149,4 +149,6 @@ MAX_ROUNDING_HALF_STEPS = 1.01
 
 def rules() -> NumberRules:
     """These limits, in the form that the core takes."""
-    return core.loops("words").NumberRules(POWERS, MAX_BULK_BYTES, MOST_DECIMALS, MAX_BULK_STEPS, TIE_TOLERANCE, MAX_ROUNDING_HALF_STEPS)
+    return core.loops("words").NumberRules(
+        POWERS, MAX_BULK_BYTES, MOST_DECIMALS, MAX_BULK_STEPS, TIE_TOLERANCE, MAX_ROUNDING_HALF_STEPS
+    )
