@@ -25,6 +25,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.account import Lacking, Reason, at_measured_places
 from ncfix.compensate.following import kinematics_of
 from ncfix.compensate.plan.arcs import Closure, across
+from ncfix.compensate.plan.findings import COUNTED
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.limits import findings, increments_beyond_travel
 from ncfix.compensate.plan.path import PathTolerance, Plan, Requirements, plan
@@ -314,7 +315,7 @@ class Planning:
                 return AcceptedPlan(self, planned, unchanged, reasons, reaches_back, tuple(history))
             for finding in (*against, *planned.findings):
                 for k, row in enumerate(finding.moves.tolist()):
-                    if stays[row]:
+                    if stays[row] and finding.code != COUNTED:
                         _explain(reasons, [int(moves.block[row])], finding.code, finding.sentence(k))
             _explain(reasons, moves.block[stays].tolist(), CODE_OF_RULE, "no correction was found for it")
             unchanged |= stays
