@@ -179,6 +179,10 @@ ASYNCHRONOUS = {
 }
 """Names that, with an axis as index, `OS[Z]=1`, move it by itself -> description."""
 
+POLYNOMIAL = "po"
+GO_SOMEWHERE = frozenset({"pos", "posa", "posp", "ax"})
+BY_THEMSELVES = frozenset(ASYNCHRONOUS) | GO_SOMEWHERE | {POLYNOMIAL}
+"""Names that, with an axis as index, move it by itself, `POS[X]=100`, or give its end, `PO[X]=(10,2)`."""
 UNSEEN = {"fxs": "travel to a fixed stop (FXS)", "g": "a G code that is named by its group (G[..])"}
 """Names that, with an index, change later motions in a way that is not followed -> description."""
 
