@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -116,6 +118,16 @@ def test_cuts_that_begin_on_a_side_nobody_knows_are_counted(
     found = [(each.place and each.place.line, each.text) for each in report.warnings if each.code == "NCF285"]
     words = "{} where nobody knows on which side of its play X is: the tip may be up to {} um off there"
     assert found == ([] if said is None else [(said[0], words.format(*said[1:]))])
+
+
+def test_a_cut_from_a_side_nobody_knows_may_be_refused_for_another_reason() -> None:
+    """Its corrected end is beyond the travel of X: that is the reason, and the side of the play is none."""
+    machine = with_play("w X Y F Z t")
+    axes = tuple(replace(axis, range=(-9.0, 9.0)) if axis.name == "X" else axis for axis in machine.axes)
+    setup = Setup(work_offsets={"G54": {}}, initial={"Y": 0.0, "Z": 100.0}, tools={0: Tool(50.0)})
+    program = read(f"{BEGINS}G1 X-9 F99\nX5\nM2\n".encode(), "part.ngc", "linuxcnc")
+    report = fix_program(program, machine.replace(axes=axes), setup, FixOptions(allow_refused=True)).report
+    assert [(each.line, each.code) for each in report.refused] == [(4, "NCF404")]
 
 
 @pytest.mark.parametrize(("turned", "aside"), [("", 1), ("G68.2 X0. Y0. Z0. I90. J30. K-90.\nG53.1\n", -1)])
