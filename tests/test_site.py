@@ -55,6 +55,6 @@ def test_nothing_is_loaded_from_elsewhere(site: Path) -> None:
 def test_the_reference_is_made_of_docstrings_and_codes(site: Path) -> None:
     functions = (site / "reference/functions.html").read_text()
     assert 'id="ncfix.api.programs.fix"' in functions
-    assert "<code>tolerance_um</code>: how far the tool tip may leave the intended path" in functions
+    assert "<code>tolerance_um</code>: largest deviation of the tool tip from the intended path" in functions
     messages = (site / "reference/messages.html").read_text()
     assert all(f'id="{code.lower()}"' in messages for code in all_codes())

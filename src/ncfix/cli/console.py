@@ -66,7 +66,7 @@ def _as_one(group: Sequence[Message]) -> Message:
 
     from ncfix.arrays import in_stretches
 
-    lines = np.unique([message.place.line for message in group if message.place])
+    lines = np.array(sorted({message.place.line for message in group if message.place}), dtype=np.int64)
     shown = "" if all(message.text == most.text for message in group) else "; the largest is shown"
     return replace(most, text=f"{most.text} ({len(group)} times, {lines_named(in_stretches(lines))}{shown})")
 
