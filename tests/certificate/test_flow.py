@@ -28,7 +28,7 @@ def executed(language: str, rows: list[str], counter: str = "") -> list[int]:
         found.append(row)
         if counter and rows[row].startswith(f"{counter}="):
             known[counter] = value_of(rows[row].partition("=")[2], known) or 0.0
-        row = order.behind(row, known)
+        row = order.line_after(row, known)
     return found
 
 

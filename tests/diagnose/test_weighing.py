@@ -28,9 +28,9 @@ from ncfix.diagnosis.forms import unnamed_alternatives
 from ncfix.diagnosis.noise import estimated_background, everything_covariance
 from ncfix.diagnosis.residual_data import residual_data
 from ncfix.diagnosis.selection import (
+    MAX_ALIAS_LAG,
     TOLD_APART,
     TRIED,
-    WITHIN,
     Selected,
     lead_needed,
     likeliest,
@@ -132,7 +132,7 @@ def test_all_names_that_come_near_one_are_weighed_in_its_place(evidence: Evidenc
     scale = Comparison(evidence)
     odds = scale.candidate_odds({})
     first = {name: odds.of(evidence.forms[name]) for name in scale.names}
-    near = {name for name, value in first.items() if value > first["EXX"] - WITHIN}
+    near = {name for name, value in first.items() if value > first["EXX"] - MAX_ALIAS_LAG}
     assert len(near) > TRIED
     assert near <= set(likeliest(scale, scale.names, {}, beside="EXX"))
 

@@ -15,13 +15,13 @@ from ncfix.certificate.formulas import value_of
 from ncfix.certificate.reading import JUMPS, Family
 from ncfix.certificate.text import Text
 
-MOST_LINES = 20_000
+MAX_LINES = 20_000
 """Largest number of executed lines; a longer program is not followed."""
-SAME = 1e-6
+EQUAL_TOLERANCE = 1e-6
 """Least difference of compared numbers that are not equal; below it, rounding in the control may decide."""
 
 
-class Lead(Enum):
+class FlowKind(Enum):
     """The ways in which a line directs the flow of a program."""
 
     JUMP = 0
@@ -34,7 +34,7 @@ class Lead(Enum):
     RETURN = 4
 
 
-class LeadingLine(NamedTuple):
+class BranchingLine(NamedTuple):
     """The effect of one line on the flow of the program.
 
     to     index of the line to which a jump leads, or of the first line of what is repeated or called
@@ -44,7 +44,7 @@ class LeadingLine(NamedTuple):
     holds  True: the jump is made if the condition holds; False: if it does not hold
     """
 
-    kind: Lead
+    kind: FlowKind
     to: int = 0
     stop: int = 0
     times: str = "1"
@@ -72,7 +72,7 @@ class OpenSection(NamedTuple):
 class LineOrder:
     """Finds the next line to execute while a program is followed."""
 
-    def __init__(self, lines: Mapping[int, LeadingLine]) -> None:
+    def __init__(self, lines: Mapping[int, BranchingLine]) -> None:
         """`lines`: the lines that direct the flow, by their index; each other line leads to the next one."""
         self.lines = lines
         self._open: list[OpenSection] = []
@@ -81,7 +81,7 @@ class LineOrder:
     @classmethod
     def of(cls, text: Text) -> LineOrder | None:
         """The order of a program; None if no line directs the flow, one that does is not plain, or the text is long."""
-        if len(text.lines) > MOST_LINES:
+        if len(text.lines) > MAX_LINES:
             return None
         odd = {row for row, line in text.apart() if line.odd is JUMPS}
         if not odd and not (text.family is Family.WORDS and SUBPROGRAM.search(text.source)):
@@ -103,41 +103,41 @@ class LineOrder:
         said = [[each._replace(to=0, stop=0) for _, each in sorted(order.lines.items())] for order in (one, other)]
         return said[0] == said[1]
 
-    def behind(self, row: int, known: Mapping[str, float | None]) -> int:
+    def line_after(self, row: int, known: Mapping[str, float | None]) -> int:
         """The line that is executed after line `row`; raises `NotPlainError`.
 
         known  the values of variables
         """
         self._executed += 1
         found, to = self.lines.get(row), row + 1
-        if self._executed > MOST_LINES:
+        if self._executed > MAX_LINES:
             raise NotPlainError
         if found is not None:
             try:
-                to = self._led(found, row, known)
+                to = self._target_of(found, row, known)
             except (LookupError, ValueError):
                 raise NotPlainError from None
         while self._open and to == self._open[-1].stop:
             to = self._again()
         return to
 
-    def _led(self, line: LeadingLine, row: int, known: Mapping[str, float | None]) -> int:
+    def _target_of(self, line: BranchingLine, row: int, known: Mapping[str, float | None]) -> int:
         """The line to which a line leads; raises `ValueError` or `LookupError` if that is not plain."""
-        if line.kind is Lead.JUMP:
+        if line.kind is FlowKind.JUMP:
             if line.when and _holds(line.when, known) != line.holds:
                 return row + 1
             inside = not self._open or self._open[-1].stop < 0 or self._open[-1].start <= line.to < self._open[-1].stop
             if not inside:
                 raise ValueError
             return line.to
-        if line.kind is Lead.RETURN:
+        if line.kind is FlowKind.RETURN:
             if self._open[-1].stop >= 0:
                 raise ValueError
             return self._again()
         times = value_of(line.times, known)
         if times is None or times != round(times) or times < 0:
             raise ValueError
-        back, more = (line.stop + 1 if line.kind is Lead.LOOP else row + 1), round(times)
+        back, more = (line.stop + 1 if line.kind is FlowKind.LOOP else row + 1), round(times)
         if not more:
             return back
         self._open.append(OpenSection(line.to, line.stop, more - 1, back))
@@ -162,7 +162,7 @@ def _holds(condition: str, known: Mapping[str, float | None]) -> bool:
     """Whether a comparison holds; raises `ValueError` if that is not plain."""
     found = CONDITION.fullmatch(condition)
     left, right = (value_of(found[side], known) for side in (1, 3)) if found else (None, None)
-    if found is None or left is None or right is None or 0 < abs(left - right) < SAME:
+    if found is None or left is None or right is None or 0 < abs(left - right) < EQUAL_TOLERANCE:
         raise ValueError
     return (left > right) - (left < right) in COMPARED[found[2]]
 
@@ -183,29 +183,31 @@ def _one(rows: Sequence[str], pattern: str, within: range | None = None) -> int:
     return row
 
 
-def _klartext(texts: Sequence[str]) -> dict[int, LeadingLine]:
-    found, rows = dict[int, LeadingLine](), [*map(_bare, texts)]
+def _klartext(texts: Sequence[str]) -> dict[int, BranchingLine]:
+    found, rows = dict[int, BranchingLine](), [*map(_bare, texts)]
     for row, text in enumerate(rows):
         if text == "LBL 0":
-            found[row] = LeadingLine(Lead.RETURN)
+            found[row] = BranchingLine(FlowKind.RETURN)
         elif call := re.fullmatch(r'CALL LBL (\d+|"[^"]*")(?: REP ?(\d+)(?:/\d+)?)?', text):
             to = _one(rows, rf"LBL {re.escape(call[1])}$")
-            found[row] = LeadingLine(Lead.REPEAT, to, row, call[2]) if call[2] else LeadingLine(Lead.CALL, to, -1)
+            found[row] = (
+                BranchingLine(FlowKind.REPEAT, to, row, call[2]) if call[2] else BranchingLine(FlowKind.CALL, to, -1)
+            )
             if call[2] and to > row:
                 raise ValueError
         elif jump := re.fullmatch(r'FN ?(?:9|1[0-2]) ?: IF (.+) GOTO LBL (\d+|"[^"]*")', text):
-            found[row] = LeadingLine(Lead.JUMP, _one(rows, rf"LBL {re.escape(jump[2])}$"), when=jump[1])
+            found[row] = BranchingLine(FlowKind.JUMP, _one(rows, rf"LBL {re.escape(jump[2])}$"), when=jump[1])
     return found
 
 
-def _sinumerik(texts: Sequence[str]) -> dict[int, LeadingLine]:
-    found, rows = dict[int, LeadingLine](), [*map(_bare, texts)]
+def _sinumerik(texts: Sequence[str]) -> dict[int, BranchingLine]:
+    found, rows = dict[int, BranchingLine](), [*map(_bare, texts)]
     for row, text in enumerate(rows):
         if jump := re.fullmatch(r"(?:IF ?(.+?) ?)?GOTO([BF]) ([A-Z_]\w+)", text):
             to = _one(rows, rf"{jump[3]}:")
             if (to > row) != (jump[2] == "F"):
                 raise ValueError
-            found[row] = LeadingLine(Lead.JUMP, to, when=_unbracketed(jump[1] or ""))
+            found[row] = BranchingLine(FlowKind.JUMP, to, when=_unbracketed(jump[1] or ""))
         elif again := re.fullmatch(r"REPEAT(B?) ([A-Z_]\w+)(?: ([A-Z_]\w+))?(?: P ?= ?(.+))?", text):
             start = _one(rows, rf"{again[2]}:")
             stop = row if not again[3] else _one(rows, rf"{again[3]}:") + 1
@@ -216,7 +218,7 @@ def _sinumerik(texts: Sequence[str]) -> dict[int, LeadingLine]:
                 stop = start + 1
             if not start < stop <= row:
                 raise ValueError
-            found[row] = LeadingLine(Lead.REPEAT, start, stop, again[4] or "1")
+            found[row] = BranchingLine(FlowKind.REPEAT, start, stop, again[4] or "1")
     return found
 
 
@@ -226,28 +228,28 @@ def _unbracketed(condition: str) -> str:
     return condition if re.search(r"[()\[\]]", inside) else inside
 
 
-def _word_address(texts: Sequence[str]) -> dict[int, LeadingLine]:
-    found, rows = dict[int, LeadingLine](), [*map(_bare, texts)]
+def _word_address(texts: Sequence[str]) -> dict[int, BranchingLine]:
+    found, rows = dict[int, BranchingLine](), [*map(_bare, texts)]
     heads = [row for row, text in enumerate(rows) if re.match(r"[O:] ?\d+(?: ?\(|$)", text)]
     for row, text in enumerate(rows):
         if loop := re.fullmatch(r"WHILE ?\[(.+)\] ?DO ?(\d)", text):
             end = next(at for at in range(row, len(rows)) if re.fullmatch(rf"END ?{loop[2]}", rows[at]))
-            found[row] = LeadingLine(Lead.JUMP, end + 1, when=loop[1], holds=False)
-            found[end] = LeadingLine(Lead.JUMP, row)
+            found[row] = BranchingLine(FlowKind.JUMP, end + 1, when=loop[1], holds=False)
+            found[end] = BranchingLine(FlowKind.JUMP, row)
         elif jump := re.fullmatch(r"(?:IF ?(\[.+\]) ?)?GOTO ?(\d+)", text):
             begin = max((head for head in heads if head <= row), default=0)
             inside = range(begin, min((head for head in heads if head > row), default=len(rows)))
             to = _one(texts, rf"[ \t]*N[ \t]*0*{int(jump[2])}\b", inside)
-            found[row] = LeadingLine(Lead.JUMP, to, when=_unbracketed(jump[1] or ""))
+            found[row] = BranchingLine(FlowKind.JUMP, to, when=_unbracketed(jump[1] or ""))
         elif call := re.fullmatch(r"M ?98 ?P ?(\d{1,4})(?: ?L ?(\d+))?", text):
             to = _one(rows, rf"[O:] ?0*{int(call[1])}\b")
-            found[row] = LeadingLine(Lead.CALL, to, -1, call[2] or "1")
+            found[row] = BranchingLine(FlowKind.CALL, to, -1, call[2] or "1")
         elif text in ("M99", "M 99"):
-            found[row] = LeadingLine(Lead.RETURN)
+            found[row] = BranchingLine(FlowKind.RETURN)
         elif loop := re.fullmatch(r"O ?(\d+) ?REPEAT ?\[(.+)\]", text):
             end = _one(rows, rf"O ?{loop[1]} ?ENDREPEAT$")
-            found[row] = LeadingLine(Lead.LOOP, row + 1, end, loop[2])
-            found[end] = LeadingLine(Lead.JUMP, end + 1)
+            found[row] = BranchingLine(FlowKind.LOOP, row + 1, end, loop[2])
+            found[end] = BranchingLine(FlowKind.JUMP, end + 1)
     return found
 
 

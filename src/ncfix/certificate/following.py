@@ -131,7 +131,7 @@ class AxisFollower(FollowedAxes):
             made.setdefault(row, []).append(None if row in order.lines else self._line(row, lines[row]))
             if call is not None and self.calls.get(row) != call:
                 self.foreign.add(row)
-            row = order.behind(row, self.variables)
+            row = order.line_after(row, self.variables)
         self.lose("behind the end of the program", rewritten=True)
         for row in range(len(lines)):
             if row not in made and row not in order.lines:

@@ -49,7 +49,7 @@ MOST_SWITCHES = 4
 ATTEMPTS = 16
 """Largest number of attempts. The second knows the frames that the first has moved, each further one those that depend
 on them."""
-ONE_BY_ONE = 4
+MAX_SINGLE_ATTEMPTS = 4
 """Attempts after which the blocks behind the first one that differs are treated as that one is: each further attempt
 would find only the next of a chain of blocks that begin where another ends, and a program may be one chain."""
 POSITION_DECIMALS = 9
@@ -274,7 +274,7 @@ def plan_and_write_all(
         if differing <= refused.keys():
             raise AssertionError(f"blocks {sorted(differing)} are unchanged and yet differ")
         attempts += 1
-        if attempts > ONE_BY_ONE:
+        if attempts > MAX_SINGLE_ATTEMPTS:
             nearest = min(differing - refused.keys())
             differing |= {block for block in whole if block > nearest} - refused.keys() - passed
         for block in differing - spelled.keys():

@@ -41,7 +41,7 @@ ALIAS_LOG_ODDS = 3.0
 """Log odds (20 to 1) within which another name explains the same data as well."""
 ASSUMED = 3.0
 """Factor on `ALIAS_LOG_ODDS` for names that act alike, whose odds rest on assumed courses and shapes."""
-WITHIN = ASSUMED * ALIAS_LOG_ODDS + TOLD_APART / 2
+MAX_ALIAS_LAG = ASSUMED * ALIAS_LOG_ODDS + TOLD_APART / 2
 """Log odds within which a name is looked at as an alias; see `lead_needed`."""
 NO_BETTER = 1.0
 """Log odds within which a name made of fewer errors is preferred."""
@@ -243,7 +243,7 @@ def likeliest(scale: Comparison, offered: Sequence[str], members: Members, besid
     odds, evidence = scale.candidate_odds(members), scale.evidence
     free = {name: odds.of(evidence.forms[name]) for name in offered if name not in members}
     order = sorted(free, key=lambda name: -free[name])
-    near = odds.of(evidence.forms[beside]) - WITHIN if beside else np.inf
+    near = odds.of(evidence.forms[beside]) - MAX_ALIAS_LAG if beside else np.inf
     named = [name for name in order if name in evidence.names]
     named = [name for place, name in enumerate(named) if place < TRIED or free[name] > near]
     nameless = [name for name in order if name in evidence.alternatives][: TRIED // 2]
@@ -269,7 +269,7 @@ def with_alternatives(scale: Comparison, members: Members) -> Selected:
         paid = entry_price(len(members)) - entry_price(len(others))
         odds[name] = gained.pop(name) + paid
         runners_up[name] = {each: value + paid for each, value in gained.items()}
-        near = [each for each, value in runners_up[name].items() if value > odds[name] - WITHIN]
+        near = [each for each, value in runners_up[name].items() if value > odds[name] - MAX_ALIAS_LAG]
         there = scale.all(members)
         for other in [each for each in near if not _overlap(evidence, there, members[name], each)]:
             del runners_up[name][other]
