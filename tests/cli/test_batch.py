@@ -213,7 +213,7 @@ def test_the_output_of_an_earlier_state_is_named(night: Any, shop: Any, parts: P
     for _ in range(2):
         entries, result = night()
         assert entries["part0.ngc"]["stale"]
-        assert "the output that is there is of an earlier state: do not run it" in result.err
+        assert "the existing output is out of date: do not run it" in result.err
         assert output.read_bytes() == before
 
 

@@ -88,7 +88,7 @@ def test_json_beside_a_file(ncfix: Any, root: Path, tmp_path: Path) -> None:
     assert path.read_bytes() == ncfix(*call, "--latex").out
     refused = ncfix(*call, "--json", "--latex")
     assert refused.code == 2
-    assert "--latex beside it needs -o FILE" in refused.err
+    assert "--latex together with it needs -o FILE" in refused.err
 
 
 @pytest.mark.parametrize(

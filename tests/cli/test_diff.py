@@ -125,7 +125,7 @@ def test_what_is_refused_or_wrong(ncfix: Any, examples: Path, shop: Any) -> None
     guide = ("-m", examples / "guide/mill.toml", "--setup", examples / "guide/setup.toml", "--diff")
     result = ncfix("fix", examples / "guide/shop/grid.nc", *guide)
     assert (result.code, result.out) == (ExitCode.REFUSED, b"")
-    assert "4 motions refused, so nothing would be written" in result.err
+    assert "4 motions refused, so `ncfix fix` would write nothing" in result.err
     shop.program.write_bytes(b"G1 X1 Y..2\nM2\n")
     result = ncfix("fix", shop.program, "-m", shop.machine, "--assume-zero", "--diff", "--json")
     assert result.code == ExitCode.UNREADABLE

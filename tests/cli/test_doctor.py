@@ -42,7 +42,7 @@ def test_packages_that_are_missing_or_too_old_are_wrong_and_those_of_extras_are_
     lines = ["lark>=1.2", "numpy!=2.0,>=1.26", "pluggy", "cython<4,>=3.2; extra == 'dev'", 'ruff>=0.9 ; extra == "dev"']
     found = {each.what: each for each in doctor.packages(lines, {"lark": "1.3", "numpy": "1.2"}.get)}
     assert {name: each.wrong for name, each in found.items() if each.wrong} == {
-        "numpy": "1.26 or later is needed",
+        "numpy": "ncfix needs 1.26 or later",
         "pluggy": "pip install 'pluggy'",
     }
     assert {*found} == {"lark", "numpy", "pluggy", *doctor.EXTRAS}

@@ -232,7 +232,7 @@ def test_a_program_that_cuts_nothing_has_no_figures(shop: Any, ncfix: Any, table
     shop.program.write_text("G21 G90\nM2\n")
     result = ncfix("emulate", "linuxcnc", tables, "-m", shop.machine, "--program", shop.program)
     assert result.code == ExitCode.DONE
-    assert "made worse" not in result.err
+    assert "make this program worse" not in result.err
 
 
 TILTED = '[[effect]]\nname = "EBX"\nbasis = "polynomial"\ndegree = [1]\nscale = 100\ncoefficients = [20e-6]\n'

@@ -153,7 +153,7 @@ def test_a_refusal_writes_nothing_unless_allowed(shop: Any, ncfix: Any) -> None:
     assert not (shop.folder / "out.ngc").exists()
     assert "--flatten" not in result.err  # there is nothing to be written out
     allowed = fixed(shop, ncfix, "--allow-refused")
-    assert "  tip error           no figure: nothing that cuts was corrected\n" in allowed.err
+    assert "  tip error           not computed: no cutting motion was corrected\n" in allowed.err
     assert "  no figure for 1 motion at feed: 1 refused\n" in allowed.err
     assert allowed.code == ExitCode.DONE
     assert b"\nG1 X500 F600\n" in (shop.folder / "out.ngc").read_bytes()

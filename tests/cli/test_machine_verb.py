@@ -14,7 +14,7 @@ from ncfix.machine import load
 def test_check_says_that_it_is_in_order(shop: Any, ncfix: Any) -> None:
     result = ncfix("machine", "check", shop.machine)
     assert (result.code, result.out) == (ExitCode.DONE, b"")
-    assert "in order, 3 axes, 1 effect\n" in result.err
+    assert "no faults, 3 axes, 1 effect\n" in result.err
     assert ncfix("machine", "check", shop.machine, "--json").json()["hash"] == load(shop.machine).hash
 
 
@@ -34,7 +34,7 @@ def test_show_prints_the_chain_and_the_errors(shop: Any, ncfix: Any) -> None:
     assert "X  linear  0 ... 500 mm          along (1, 0, 0)" in page
     assert "positioning of X" in page
     assert "+0 ... +50 um" in page
-    assert "no errors: a perfect machine" in ncfix("machine", "show", shop.perfect).out.decode()
+    assert "no errors" in ncfix("machine", "show", shop.perfect).out.decode()
 
 
 def test_show_as_json(shop: Any, ncfix: Any) -> None:

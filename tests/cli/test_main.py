@@ -108,7 +108,7 @@ def test_a_bug_is_owned_up_to_with_a_traceback_only_on_request(ncfix: Any, monke
     monkeypatch.delenv("NCFIX_DEBUG", raising=False)
     result = ncfix("extra")
     assert (result.code, result.out) == (ExitCode.FAULT, b"")
-    assert "NCF000: this is a fault of ncfix: ZeroDivisionError" in result.err
+    assert "NCF000: internal fault of ncfix: ZeroDivisionError" in result.err
     assert "Traceback" not in result.err
     assert "Traceback" in ncfix("--debug", "extra").err
     monkeypatch.setenv("NCFIX_DEBUG", "1")

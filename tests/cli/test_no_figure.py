@@ -63,7 +63,7 @@ def test_probing_cuts_nothing_and_is_counted(ncfix: Any, tmp_path: Path, common:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"), [(NOTHING, "nothing corrected"), (RAPIDS, "nothing that cuts was corrected")]
+    ("text", "words"), [(NOTHING, "nothing corrected"), (RAPIDS, "no cutting motion was corrected")]
 )
 def test_no_zero_stands_for_nothing_looked_at(
     text: str, words: str, ncfix: Any, tmp_path: Path, common: list[object]
@@ -77,7 +77,7 @@ def test_no_zero_stands_for_nothing_looked_at(
     assert "0.00 um, rms" not in result.err
     told = ncfix("verify", program, output, *common, "--dialect", "fanuc")
     assert told.code == ExitCode.DONE
-    assert "nothing cuts: there is nothing to compare" in told.out.decode()
+    assert "no motion cuts: there is nothing to compare" in told.out.decode()
     assert "0.00 um" not in told.out.decode()
 
 

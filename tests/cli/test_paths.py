@@ -108,7 +108,7 @@ def test_verify_sees_that_the_original_is_wrong(shop: Any, ncfix: Any) -> None:
     before, after, *_, verdict = result.out.decode().splitlines()
     figures = after.removeprefix("tip error after:  ")
     assert before == f"tip error before: {figures} of the original"
-    assert verdict.startswith("NOT within 1 um and 0.87 um of the control's digits: lines ")
+    assert verdict.startswith("NOT within 1 um, plus 0.87 um for the control's digits: lines ")
     loose = ncfix("verify", shop.program, shop.program, "-m", shop.machine, "--assume-zero", "--tolerance-um", "22")
     assert loose.code == ExitCode.DONE
 
@@ -181,7 +181,7 @@ def test_verify_names_what_it_could_not_look_at(ncfix: Any, examples: Path, tmp_
     program.write_bytes(b"BEGIN PGM A MM\nL X+0 Y+0 Z+5 FMAX\nL X+10 F100\nL X+Q7\nL X+30 Y+5 F100\nEND PGM A MM\n")
     call = ["verify", program, program, "-m", examples / "machines/three_axis.toml", "--assume-zero"]
     result = ncfix(*call, "--tolerance-um", "100")
-    assert "not looked at: lines 4 5 of the original" in result.out.decode()
+    assert "not examined: lines 4 5 of the original" in result.out.decode()
     assert ncfix(*call, "--json").json()["lines_not_looked_at"] == [4, 5]
 
 
@@ -218,4 +218,4 @@ def test_verify_says_where_nothing_could_be_corrected(ncfix: Any, examples: Path
     assert found.json()["left_where_it_stands"] == [{"axis": "Z", "lines": [3]}]
     assert found.code == ExitCode.FINDINGS
     said = ncfix("verify", program, out, *options).out.decode()
-    assert "along Z nothing can be corrected in line 3 of the original: the program has not said where Z stands" in said
+    assert "Z cannot be corrected in line 3 of the original: the program has not given the position of Z" in said

@@ -40,7 +40,7 @@ def test_a_post_names_the_program_only(ncfix: Any, yard: Path, monkeypatch: pyte
     monkeypatch.chdir(yard.parent)
     result = ncfix("fix", yard / "jobs/a/part.ngc")
     assert result.code == ExitCode.DONE, result.err
-    assert "ncfix.toml: options that are not given here come from this file\n" in result.err
+    assert "ncfix.toml: options that the command line does not give come from this file\n" in result.err
     assert outputs(yard / "done") == {"jobs/a/part.ngc": "mill"}
     assert "ncfix.toml" not in ncfix("fix", yard / "jobs/plate.ngc", "-q").err
 
@@ -118,7 +118,7 @@ def test_outputs_of_all_groups_are_no_programs_the_next_night(ncfix: Any, yard: 
     result = ncfix("fix", ".", "--json")
     assert result.code == ExitCode.DONE, result.err
     assert [each["resumed"] for each in result.json()["files"]] == [True] * 3
-    assert result.err.count("options that are not given here") == 1
+    assert result.err.count("options that the command line does not give") == 1
     assert len(ncfix("check", ".", "--json").json()["files"]) == 3
     assert len(ncfix("check", "rest", "--json").json()["files"]) == 1
 
@@ -174,11 +174,11 @@ def test_verify_and_check_know_the_machine(ncfix: Any, yard: Path) -> None:
         ("[options]\nstrategy = true", "neither a text nor a number"),
         ("[options]\njobs = 2.5", "NCF028: jobs: "),
         ("[options]\noffset = 3", "NCF028: offset: '3' has no ="),
-        ("[options]\nforce = true", "NCF028: force: is said on the command line"),
+        ("[options]\nforce = true", "NCF028: force: can be given on the command line"),
         ("[options]\nin_place = true", "hint: --in-place"),
         ("[options]\nexecutor = 'dask://elsewhere:8786'", "NCF028: executor: is said on the command line"),
         ("setup = ''", "NCF028: setup: the text is empty"),
-        ('output = "a\\u0000b"', "has a NUL character"),
+        ('output = "a\\u0000b"', "contains a NUL character"),
         ("\n[[programs]]\nmatch = '*'\ntool_table = ''", "ncfix.toml:4:1"),
         ("[options]\ntool = '1=1'\n[[programs]]\nmatch='*'\n[programs.options]\ntool = '1'", "ncfix.toml:6:1"),
         ("programs = 3", "list of tables"),

@@ -68,15 +68,15 @@ def test_start_positions_may_be_given_one_by_one_as_messages_ask_for_them() -> N
         (["--offset", "G54=1;2"], "1;2"),
         (["--offset", "G54="], "G54="),
         (["--offset", "G54=nan"], "'nan' is not a number"),
-        (["--tool", "T12=3"], "not a tool number"),
+        (["--tool", "T12=3"], "neither a tool number"),
         (["--tool", "12=1,2,3"], "a length"),
         (["--tool", "12=120,5"], "decimal comma: 120.5 is a length, 120.0,5.0 a length and a radius"),
         (["--tool", "12=inf"], "'inf' is not a number"),
         (["--initial", "X0"], "not an axis and a number"),
         (["--initial", "XY=0"], "not an axis and a number"),
         (["--initial", "X=1,5"], "not an axis and a number"),
-        (["--initial", "X=1,X=2"], "X is there twice"),
-        (["--offset", "G54=X1,Z2,X3"], "an axis is there twice"),
+        (["--initial", "X=1,X=2"], "axis X is given twice"),
+        (["--offset", "G54=X1,Z2,X3"], "an axis is named twice"),
     ],
 )
 def test_what_is_wrong_is_said(arguments: list[str], said: str) -> None:

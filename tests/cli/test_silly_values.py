@@ -21,7 +21,7 @@ SILLY = [
     (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--offset", "G54=a"], 2, "'' is not a number"),
     (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--offset", "G54=1;2"], 2, "'1;2' is not a number"),
     (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--tolerance-um", "nan"], 2, "not a number above zero"),
-    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--tolerance-um", "1e-9"], 2, "is less than 0.01"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--tolerance-um", "1e-9"], 2, "is below 0.01"),
     (["fix", "part.ngc", "-m", "machine.toml", "-o", "a\0b"], 2, "NCF001: an argument has a NUL character"),
     (["export", "linuxcnc", "-m", "machine.toml", "-o", ""], 2, "NCF003: tables are several files"),
     (["export", "linuxcnc", "-m", "machine.toml", "-o", "-"], 2, "hint: -o FOLDER"),

@@ -78,5 +78,5 @@ def test_what_no_keyword_can_be(keywords: dict[str, str]) -> None:
 
 def test_languages_that_have_none() -> None:
     dialect: Dialect = family("heidenhain").derive("words", title="Words", keywords={"MOVE": "G1"})
-    with pytest.raises(PluginError, match="codes of its own"):
+    with pytest.raises(PluginError, match="codes of this dialect"):
         language_of(dialect, Language)

@@ -204,7 +204,7 @@ def counted(count: int, thing: str) -> str:
 def error_figures(error: Mapping[str, Any]) -> str:
     """The figures of an error along a path, in words."""
     if error["max"] is None:
-        return "none, for nothing was looked at"
+        return "none: no motion was examined"
     where = f", worst at line {error['where']}" if error.get("where") else ""
     return f"max {error['max']:.2f} um, rms {error['rms']:.2f} um{where}"
 
@@ -299,8 +299,8 @@ def owned(error: Exception) -> NcfixError:
         _trace(error)
         return plugin
     if isinstance(error, MemoryError):
-        hint = "leave out what is not needed, or do it on a computer with more memory"
-        return FaultError.of("NCF024", "there is not enough memory for this", hint=hint)
+        hint = "use less data, or a computer with more memory"
+        return FaultError.of("NCF024", "not enough memory", hint=hint)
     if isinstance(error, core.UnusableCoreError):
         return UsageError.of("NCF001", str(error), hint=f"unset {core.WISH}")
     return fault(error)
@@ -326,8 +326,10 @@ def fault(error: Exception) -> FaultError:
     _trace(error)
     where = traceback.extract_tb(error.__traceback__)[-1]
     at = f"{os.path.basename(where.filename)}:{where.lineno}"
-    text = f"this is a fault of ncfix: {type(error).__name__}: {error} ({at})"
-    return FaultError.of("NCF000", text, hint="ncfix --debug shows the traceback; please report it with the input")
+    text = f"internal fault of ncfix: {type(error).__name__}: {error} ({at})"
+    return FaultError.of(
+        "NCF000", text, hint="run it again with ncfix --debug, and report the traceback with the input"
+    )
 
 
 @contextmanager

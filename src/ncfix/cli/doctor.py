@@ -23,10 +23,10 @@ from ncfix.version import __version__
 
 EXTRAS = {
     "sympy": ("symbolic", "`ncfix derive` does not work"),
-    "watchfiles": ("watch", "`ncfix watch` looks every second"),
+    "watchfiles": ("watch", "`ncfix watch` looks at the folder once a second"),
     "distributed": ("cluster", "`--executor dask://HOST:PORT` does not work"),
-    "plotly": ("report", "there are no pages of programs"),
-    "matplotlib": ("plot", "there are no pictures of programs (`--plot`)"),
+    "plotly": ("report", "no pages of programs (`--report`)"),
+    "matplotlib": ("plot", "no pictures (`--plot`)"),
 }
 """Optional packages: package -> its extra, and the consequence of its absence."""
 NEEDS = re.compile(r"([A-Za-z0-9_.-]+)(?:[^;]*?>=\s*([0-9.]+))?[^;]*(;.*\bextra\b)?")
@@ -52,7 +52,7 @@ def findings() -> Iterator[HostFinding]:
     """All items, in order."""
     yield HostFinding("ncfix", f"{__version__}, {Path(__file__).parents[1]}")
     python = f"{platform.python_version()}, {sys.executable}"
-    yield HostFinding("Python", python, "" if sys.version_info >= OLDEST_PYTHON else "3.11 or later is needed")
+    yield HostFinding("Python", python, "" if sys.version_info >= OLDEST_PYTHON else "ncfix needs 3.11 or later")
     yield HostFinding("computer", f"{platform.platform()}, {console.counted(host.processors(), 'processor')} available")
     yield from packages(_requirements(), _version)
     stale = core.fault() and core.has_binary()  # it is not of these sources
@@ -80,7 +80,7 @@ def packages(requirements: Iterable[str], version_of: Callable[[str], str | None
         if there is None:
             yield HostFinding(name, "not installed", f"pip install '{name}{f'>={wanted}' if wanted else ''}'")
         elif _numbers(there) < _numbers(wanted):
-            yield HostFinding(name, there, f"{wanted} or later is needed")
+            yield HostFinding(name, there, f"ncfix needs {wanted} or later")
         else:
             yield HostFinding(name, there)
     for name, (extra, without) in EXTRAS.items():
@@ -125,7 +125,9 @@ def _caches() -> Iterator[HostFinding]:
         state = "writable" if can else "not writable"
         yield HostFinding("cache", f"{folder}, {size / 1e6:.1f} MB, {state}")
     if not writable:
-        yield HostFinding("caches", "none is writable", "make one of them; until then each start takes longer")
+        yield HostFinding(
+            "caches", "none is writable", "make one of these folders writable; until then ncfix starts more slowly"
+        )
 
 
 def _writable(folder: Path) -> bool:
@@ -139,7 +141,9 @@ def _temporary() -> HostFinding:
     folder = tempfile.gettempdir()
     room = _room(folder)
     wrong = (
-        "" if room is None or room > 1 << 30 else "make room, or set TMPDIR: long programs from pipes are kept there"
+        ""
+        if room is None or room > 1 << 30
+        else "make room, or set TMPDIR to another folder: long programs from pipes are stored there"
     )
     return HostFinding("temporary files", folder + ("" if room is None else f", {room / 1e9:.1f} GB free"), wrong)
 
@@ -168,8 +172,10 @@ def _outputs() -> HostFinding:
         return HostFinding(
             "working folder", f"{visible(os.getcwd())}: {error.messages[0].text}", error.messages[0].advice
         )
-    how = "" if unnamed else ", first as .ncfix-*.tmp"
-    return HostFinding("working folder", f"{visible(os.getcwd())}: writable; outputs appear whole or not at all{how}")
+    how = "" if unnamed else ", at first under the name .ncfix-*.tmp"
+    return HostFinding(
+        "working folder", f"{visible(os.getcwd())}: writable; an output appears only when it is complete{how}"
+    )
 
 
 def _has_unnamed(folder: str) -> bool:
@@ -185,7 +191,7 @@ def _has_unnamed(folder: str) -> bool:
 def doctor(as_json: bool) -> int:
     """Check the installation: packages, plugins, the compiled core, caches.
 
-    Exit code 1 if something is wrong.
+    Exit code 1: something is wrong.
     """
     found = list(findings())
     if as_json:

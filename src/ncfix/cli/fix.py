@@ -105,58 +105,83 @@ def _executors() -> Iterable[str]:
     type=PATH,
     metavar="FILE|DIR",
     envvar="NCFIX_OUTPUT",
-    help="Where to write; a folder for many programs; - for stdout.",
+    help="Output file; a folder for several programs; - for standard output.",
 )
-@click.option("--in-place", is_flag=True, help="Put the result in PROGRAM's place and keep that as PROGRAM.orig.")
+@click.option("--in-place", is_flag=True, help="Replace PROGRAM by the result; the original becomes PROGRAM.orig.")
 @click.option(
-    "--force", is_flag=True, help="Replace an output; correct a stamped program; accept impossible values of a machine."
+    "--force",
+    is_flag=True,
+    help="Replace outputs that exist, correct a program that is already corrected "
+    "(stamped), use a machine file with impossible values.",
 )
-@click.option("--resume", is_flag=True, help="Continue a batch: do again only what has changed since.")
-@click.option("--retry", is_flag=True, help="With --resume, try again what failed, though nothing has changed.")
+@click.option("--resume", is_flag=True, help="Continue a batch: skip programs that are done and have not changed.")
+@click.option("--retry", is_flag=True, help="With --resume: also repeat programs that failed and have not changed.")
 @click.option(
     "--strategy",
     type=OneOf(_strategies),
     default="rotary-then-linear",
     show_default=True,
     metavar="NAME",
-    help="rotary-then-linear, position or full.",
+    help="Strategy of correction: rotary-then-linear, position or full.",
 )
-@click.option("--thesis", is_flag=True, help="Ellingsdalen's printed algorithm, without the corrections to it.")
+@click.option("--thesis", is_flag=True, help="Use Ellingsdalen's algorithm as printed, without later corrections.")
 @tolerance_option
 @dialect_option
 @setup_options
-@click.option("--split-rapids", is_flag=True, help="Hold the tolerance along rapids too, not only at their ends.")
-@click.option("--flatten", is_flag=True, help="Write loops, subprograms and cycles out where they cannot be corrected.")
+@click.option(
+    "--split-rapids", is_flag=True, help="Keep the tolerance along rapid motions too, not only at their ends."
+)
+@click.option(
+    "--flatten",
+    is_flag=True,
+    help="Write loops, subprograms and cycles out as single blocks where they cannot be corrected otherwise.",
+)
 @click.option(
     "--block-numbers",
     type=click.Choice(BLOCK_NUMBERS),
     default="same",
     show_default=True,
-    help="Numbers of inserted blocks (Klartext); renumber: of all blocks, anew (SINUMERIK, too).",
+    help="Block numbers (Klartext): same or none for inserted blocks; renumber: number all blocks again (also "
+    "SINUMERIK).",
 )
-@click.option("--allow-refused", is_flag=True, help="Write the program even if motions had to be left uncorrected.")
+@click.option(
+    "--allow-refused", is_flag=True, help="Write the program although motions were refused; they stay uncorrected."
+)
 @click.option(
     "--report",
     "page",
     type=PATH,
     metavar="FILE.html",
-    help="Make a page of the program, or of the batch and each program.",
+    help="Write an HTML page of the program; for several programs, of the batch and of each program.",
 )
-@click.option("--plot", type=PATH, metavar="FILE.svg|png|pdf", help="Draw the errors of one program for a paper.")
+@click.option("--plot", type=PATH, metavar="FILE.svg|png|pdf", help="Write a picture of the errors of one program.")
 @click.option(
-    "--certificate", is_flag=True, help="Let an independent reader prove the result; its certificate stands beside it."
+    "--certificate",
+    is_flag=True,
+    help="Prove the result with an independent reader; write its certificate beside the output.",
 )
-@click.option("--diff", is_flag=True, help="Print how the text would change (unified diff); write nothing.")
-@click.option("--diff-motions", is_flag=True, help="Print which commands would change, and why; write nothing.")
-@click.option("--no-figures", "figures", is_flag=True, flag_value=False, default=True, help="Leave out the tip errors.")
+@click.option("--diff", is_flag=True, help="Print the changes of the text (unified diff); write nothing.")
+@click.option(
+    "--diff-motions",
+    is_flag=True,
+    help="Print the changes of each command, and the errors that cause them; write nothing.",
+)
+@click.option(
+    "--no-figures",
+    "figures",
+    is_flag=True,
+    flag_value=False,
+    default=True,
+    help="Do not compute the tip errors before and after.",
+)
 @click.option(
     "-j",
     "--jobs",
     type=Jobs(),
     default="auto",
-    show_default="auto, as many as help",
+    show_default="auto: as many as are useful",
     metavar="N|auto",
-    help="Processes that work on a long program, or programs at a time; the result is the same.",
+    help="Number of processes; the result does not depend on it.",
 )
 @click.option(
     "--executor",
@@ -164,15 +189,17 @@ def _executors() -> Iterable[str]:
     default="processes",
     show_default=True,
     metavar="NAME",
-    help="What runs the programs of a batch: processes, a plugin's, or dask://HOST:PORT.",
+    help="Where a batch runs: processes (this computer), dask://HOST:PORT, or an executor of a plugin.",
 )
-@click.option("--time-limit-s", type=Positive(), metavar="S", help="Seconds that one program may take.")
-@click.option("--memory-limit-mb", type=click.IntRange(1), metavar="MB", help="Memory that one program may take.")
-@click.option("-q", "--quiet", is_flag=True, help="Say only which programs were not written, and why.")
-@click.option("-v", "--verbose", is_flag=True, help="Say everything about each program of a batch, and its dialect.")
+@click.option("--time-limit-s", type=Positive(), metavar="S", help="Time limit for one program, s.")
+@click.option("--memory-limit-mb", type=click.IntRange(1), metavar="MB", help="Memory limit for one program, MB.")
+@click.option("-q", "--quiet", is_flag=True, help="Print only the programs that were not written, and why.")
+@click.option("-v", "--verbose", is_flag=True, help="Print everything about each program, also in a batch.")
 @project_options
 @json_option
-@click.option("--json-lines", is_flag=True, help="Print one JSON object for each program as soon as it is done.")
+@click.option(
+    "--json-lines", is_flag=True, help="Print one JSON object on one line for each program as soon as it is done."
+)
 def fix(
     programs: tuple[str, ...],
     machine_path: str,
@@ -198,25 +225,24 @@ def fix(
     json_lines: bool,
     **choices: Any,
 ) -> int:
-    """Rewrite each PROGRAM so that this machine cuts what was meant; of a folder, all programs below it.
+    """Correct each PROGRAM for the errors of this machine; for a folder, all programs in it and below.
 
-    Programs are never changed where they are unless --in-place says so. Exit code 4: motions were refused and nothing
-    was written.
+    PROGRAM itself is changed only with --in-place. Exit code 4: motions were refused and nothing was written.
     """
     from ncfix.batch.work import executor_of
     from ncfix.cli.shop.batch import Batch, FixJob, ProgramLimits
     from ncfix.cli.shop.summary import Verbosity
 
     if as_json and json_lines:
-        raise UsageError.of("NCF001", "--json and --json-lines are two forms of one output", hint="leave one out")
+        raise UsageError.of("NCF001", "--json and --json-lines cannot be used together", hint="use one of them")
     if json_lines and (diff or diff_motions):
-        raise UsageError.of("NCF001", "what would change is printed as text or as one object", hint="--json")
+        raise UsageError.of("NCF001", "the changes are printed as text or as JSON, not both", hint="--json")
     if (diff or diff_motions) and (page or plot):
-        raise UsageError.of("NCF001", "--diff writes nothing, and so no page", hint="leave one of them out")
+        raise UsageError.of("NCF001", "--diff writes no files, so also no page", hint="use one of them")
     if certificate and output == STREAM:
-        raise UsageError.of("NCF001", "a certificate stands beside a file", hint="-o FILE")
+        raise UsageError.of("NCF001", "a certificate is written beside an output file", hint="-o FILE")
     if retry and not resume:
-        raise UsageError.of("NCF001", "--retry tries again what --resume would leave out", hint="--resume --retry")
+        raise UsageError.of("NCF001", "--retry needs --resume", hint="--resume --retry")
     context = click.get_current_context()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
     looks = diff or diff_motions

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ncfix.text.dialect import Dialect
 
 SHELLS = ("bash", "zsh", "fish")
-PARTS = (("understands", "corrected"), ("passes", "passed by rule"), ("refuses", "refused, with the line"))
+PARTS = (("understands", "corrected"), ("passes", "passed by rule"), ("refuses", "refused, with line and reason"))
 """Fields of `Dialect`, and their headings."""
 FLOORS = (
     "cli",
@@ -42,7 +42,7 @@ FLOORS = (
 @click.argument("name", type=DIALECT, required=False, metavar="[NAME]")
 @json_option
 def dialects(name: str | None, as_json: bool) -> None:
-    """List the dialects for `--dialect`, with the file suffixes that suggest them; or all about the one called NAME."""
+    """List the dialects for `--dialect` with their file suffixes; with NAME, describe that dialect."""
     if name is None:
         found: dict[str, Dialect] = registry("dialects")
     else:
@@ -57,7 +57,7 @@ def dialects(name: str | None, as_json: bool) -> None:
         for field, heading in PARTS:
             lines += ["", heading, *(f"  {sentence}" for sentence in getattr(found[name], field))]
         if own := own_codes(found[name]):
-            lines += ["", "codes of its own", *(f"  {sentence}" for sentence in own)]
+            lines += ["", "codes of this dialect", *(f"  {sentence}" for sentence in own)]
         if words := found[name].keywords:
             lines += ["", "keywords", *(f"  {word}: {meaning}" for word, meaning in words)]
         console.put("".join(f"{line}\n" for line in lines))
@@ -88,7 +88,7 @@ def all_codes() -> dict[str, Code]:
 @click.argument("code", type=OneOf(all_codes), required=False)
 @json_option
 def explain(code: str | None, as_json: bool) -> None:
-    """Explain the message code CODE, e.g. NCF002; without CODE list them all."""
+    """Explain the message code CODE, e.g. NCF002; without CODE, list all codes."""
     codes = all_codes()
     if code is not None:
         code = f"NCF{code}" if code.isdecimal() else code.upper()
@@ -111,7 +111,7 @@ def explain(code: str | None, as_json: bool) -> None:
 @click.command()
 @json_option
 def plugins(as_json: bool) -> int:
-    """List the plugins, what each adds, and whether the core is compiled; exit code 1 if one was left out."""
+    """List the plugins, what each adds, and whether the core is compiled. Exit code 1: a plugin was left out."""
     found = load_plugins()
     if as_json:
         entries = [

@@ -48,9 +48,9 @@ def machine() -> None:
 @click.argument("file", type=PATH)
 @json_option
 def check(file: str, as_json: bool) -> int:
-    """Check that FILE describes a machine.
+    """Check a machine file: its form, and whether its values are possible.
 
-    Every fault of the file is named at once. Exit code 1: it can be read, but there is no such machine.
+    All faults are reported together. Exit code 1: the file can be read, but describes an impossible machine.
     """
     from ncfix.machine.plausible import doubts
 
@@ -63,11 +63,11 @@ def check(file: str, as_json: bool) -> int:
     if as_json:
         console.put_json(path=shown(file), ok=not impossible, name=found.name, hash=found.hash, remarks=remarks)
     elif impossible:
-        console.say(f"{name}: {console.counted(impossible, 'fault')}: no machine is like this one")
+        console.say(f"{name}: {console.counted(impossible, 'fault')}: this machine is impossible")
     else:
         axes = "1 axis" if len(found.axes) == 1 else f"{len(found.axes)} axes"
         effects = console.counted(len(found.effects), "effect")
-        console.say(f"{name}: in order, {axes}, {effects}")
+        console.say(f"{name}: no faults, {axes}, {effects}")
     return ExitCode.FINDINGS if impossible else ExitCode.DONE
 
 
@@ -78,13 +78,18 @@ def _remarks(machine: Machine, path: str) -> list[Message]:
     remarks = []
     known = registry("controls") | registry("dialects")
     if machine.control and machine.control not in known:
-        text = f"control: {machine.control!r} has neither a dialect nor tables here, and is passed over"
+        text = f"control: {machine.control!r} is neither a dialect nor a control with tables, and is ignored"
         remarks.append(Message("NCF318", text, Place(path), nearest(machine.control, known)))
     ahead = {effect.name for axis in machine.axes for effect in machine.effects if runs_ahead(axis, effect)}
     for name in sorted(ahead):
-        text = f"{name}: the body is ahead of its axis on both ways; lost motion has the other sign here"
+        text = (
+            f"{name}: with this sign the body is ahead of its axis in both directions; lost motion has the opposite "
+            "sign here"
+        )
         remarks.append(
-            Message("NCF319", text, Place(path), "it stays if the control takes out more play than there is")
+            Message(
+                "NCF319", text, Place(path), "keep the sign only if the control compensates more backlash than there is"
+            )
         )
     return remarks
 
@@ -93,9 +98,9 @@ def _remarks(machine: Machine, path: str) -> list[Message]:
 @click.argument("file", type=PATH)
 @json_option
 def show(file: str, as_json: bool) -> None:
-    """Print the chain and the errors of a machine.
+    """Print the axes and the errors of a machine.
 
-    The chain goes from workpiece to tool; the errors have their size over the travel.
+    The axes are in the order from workpiece to tool. The size of an error is its range over the travel.
     """
     found = load_machine(file)
     if as_json:
@@ -156,14 +161,14 @@ def _page(machine: Machine) -> Iterator[str]:
             yield f"  {axis.name}  {kind}  {travel_of(axis):<20}  {where} {vector(axis.direction)}{through}"
     yield f"tool        tip to spindle {vector(machine.tool.direction)}, gauge line at {vector(machine.tool.point)}"
     if not machine.effects:
-        yield "\nno errors: a perfect machine"
+        yield "\nno errors"
     for joint in (*machine.axis_names, "S"):
         found = [effect for effect in machine.effects if effect.joint == joint]
         if found:
             yield f"\nerrors of {joint}" if joint != "S" else "\nerrors of the spindle"
         for effect in found:
             entry = _effect_as_dict(machine, effect)
-            size = "size not known from the file"
+            size = "size not known: depends on an input or an axis without range"
             if entry["range"] is not None:
                 low, high = entry["range"]
                 size = f"{low:+.3g} {entry['unit']}" if low == high else f"{low:+.3g} ... {high:+.3g} {entry['unit']}"
@@ -171,13 +176,20 @@ def _page(machine: Machine) -> Iterator[str]:
 
 
 @click.command()
-@click.option("-m", "--machine", "path", type=PATH, metavar="FILE", help="List the effects that this machine can have.")
-@click.option("--bases", is_flag=True, help="List the bases for `basis = ...` with their keys instead.")
+@click.option(
+    "-m",
+    "--machine",
+    "path",
+    type=PATH,
+    metavar="FILE",
+    help="Machine file: list the effects that this machine can have.",
+)
+@click.option("--bases", is_flag=True, help="List the bases for `basis = ...` and their keys instead.")
 @json_option
 def effects(path: str | None, bases: bool, as_json: bool) -> None:
     """List the error effects that a machine file may have: ISO 230-1 components, then physical effects by name.
 
-    Without a machine, those of one with X Y Z and a table with B and C.
+    Without --machine: those of a machine with X, Y, Z and a table with B and C.
     """
     from ncfix.machine import loads
 
@@ -263,18 +275,26 @@ def _bases() -> list[Row]:
 @click.command()
 @click.option("-m", "--machine", "machine_path", type=PATH, metavar="FILE", help="The machine file (TOML).")
 @click.option(
-    "--chain", "chain_path", type=PATH, metavar="FILE", help="A chain file (docs/derive.md) instead of a machine."
+    "--chain", "chain_path", type=PATH, metavar="FILE", help="Chain file (docs/derive.md) instead of a machine file."
 )
-@click.option("--order", type=click.IntRange(1, 4), default=1, show_default=True, help="Order of the errors.")
-@click.option("--effects", metavar="LIST", help="Groups motions, locations, spindle, machine; names or patterns: E?C.")
-@click.option("--letters", is_flag=True, help="Fixed angles between axes as letters instead of their values.")
+@click.option(
+    "--order", type=click.IntRange(1, 4), default=1, show_default=True, help="Order of the expansion in the errors."
+)
+@click.option(
+    "--effects",
+    metavar="LIST",
+    help="Errors to include: the groups motions, locations, spindle, machine; names or patterns like E?C.",
+)
+@click.option("--letters", is_flag=True, help="Write fixed angles between axes as letters instead of values.")
 @click.option("--latex", "form", flag_value="latex", help="Print LaTeX.")
 @click.option("--python", "form", flag_value="python", help="Print a Python module of numpy functions.")
 @click.option("--c", "form", flag_value="c", help="Print C source of the same functions.")
-@click.option("--protocol", "form", flag_value="protocol", help="Print what can be identified, and a protocol.")
-@click.option("--vary", metavar="LIST", default="tool_length", help="Lengths to vary as well, for --protocol.")
 @click.option(
-    "-o", "--output", type=PATH, metavar="FILE", default=STREAM, help="Where to write instead of standard output."
+    "--protocol", "form", flag_value="protocol", help="Print which errors can be identified, and a measuring protocol."
+)
+@click.option("--vary", metavar="LIST", default="tool_length", help="Lengths that are varied too, for --protocol.")
+@click.option(
+    "-o", "--output", type=PATH, metavar="FILE", default=STREAM, help="Output file; default: standard output."
 )
 @force_option
 @json_option
@@ -290,14 +310,14 @@ def derive(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Derive the nominal formulas and the error formulas of a machine, simplified.
+    """Derive the formulas of the tool tip and of its error for a machine, simplified.
 
     Needs the extra `symbolic`: pip install "ncfix[symbolic]".
     """
     if (machine_path is None) == (chain_path is None):
         raise click.UsageError("give one of --machine and --chain")
     if as_json and form and output == STREAM:
-        raise click.UsageError(f"--json prints the formulas in a form of its own; --{form} beside it needs -o FILE")
+        raise click.UsageError(f"--json prints the formulas itself; --{form} together with it needs -o FILE")
     source = machine_path or chain_path or ""
     target = targets([source], Outputs(output, force=force))[0]
     from ncfix.machine import symbolic

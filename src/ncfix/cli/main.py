@@ -19,27 +19,27 @@ from ncfix.plugins import PluginWarning, registry
 from ncfix.version import __version__
 
 VERBS = {
-    "fix": "Rewrite programs so that this machine cuts what was meant.",
-    "watch": "Correct programs that come into a folder, each when it is complete.",
-    "check": "Find what is wrong in programs; write nothing.",
+    "fix": "Correct programs for the errors of this machine.",
+    "watch": "Correct the programs that arrive in a folder, each when it is complete.",
+    "check": "Find faults in programs and what cannot be corrected; write nothing.",
     "trace": "Print the motions of a program as a table.",
-    "verify": "Check a corrected program against its original, by simulation.",
-    "simulate": "Say what this machine's errors do to a program or a measurement.",
-    "plan": "Choose the poses to be measured.",
+    "verify": "Compare a corrected program with its original by simulation.",
+    "simulate": "Compute the tip error of an uncorrected program, or simulate a measurement.",
+    "plan": "Choose the poses of a measurement.",
     "calibrate": "Estimate the errors of a machine from measurements.",
-    "diagnose": "Name the effect that the model of a machine lacks.",
+    "diagnose": "Find and name the effects that the model of a machine lacks.",
     "export": "Write compensation tables for a control.",
-    "emulate": "Run the tables of a folder; say what error they leave.",
-    "lint": "Find faults in files of tables.",
-    "report": "Make a page of a program, machines or results.",
-    "derive": "Derive the formulas of a machine and of its errors.",
+    "emulate": "Run the tables of a folder and compute the remaining error.",
+    "lint": "Find faults in compensation table files.",
+    "report": "Write a page about a program, machines or results.",
+    "derive": "Derive the kinematic formulas of a machine and of its errors.",
     "machine": "Check or show a machine file.",
     "effects": "List the errors that a machine file may have.",
     "dialects": "List the control languages that can be read.",
     "plugins": "List the plugins and what each adds.",
     "init": "Write a project file, so that programs need no options.",
     "explain": "Explain a message code.",
-    "doctor": "Check the installation, and say what is wrong.",
+    "doctor": "Check the installation.",
     "manual": "Print the manual page.",
     "completion": "Print the completion script of a shell.",
 }
@@ -105,9 +105,9 @@ class Verbs(click.Group):
 
 @click.command(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="ncfix", message="%(prog)s %(version)s")
-@click.option("--debug", is_flag=True, help="Show the traceback of a fault of ncfix (also NCFIX_DEBUG=1).")
+@click.option("--debug", is_flag=True, help="Show the traceback of an internal fault (also NCFIX_DEBUG=1).")
 def cli(debug: bool) -> None:
-    """Make a machine tool cut right: know its errors, rewrite its programs."""
+    """Correct the geometric errors of a machine tool: in its NC programs, or by tables of its control."""
 
 
 def main() -> None:
@@ -137,7 +137,7 @@ def _run(arguments: Sequence[str]) -> int:
     as_json = next((option for option in ("--json", "--json-lines") if option in arguments), None)
     try:
         if any("\0" in argument for argument in arguments):
-            raise UsageError.of("NCF001", "an argument has a NUL character", hint="no name of a file has one")
+            raise UsageError.of("NCF001", "an argument contains a NUL character", hint="a file name cannot contain one")
         with plugin_warnings_as_messages():
             return int(cli.main(list(arguments), prog_name="ncfix", standalone_mode=False) or 0)
     except click.ClickException as error:
@@ -162,7 +162,9 @@ def wrong_use(error: click.ClickException, arguments: Sequence[str], as_json: st
     text = error.format_message().replace("\n\t", " ")  # names of choices, each on a line
     lacks = isinstance(error, click.MissingParameter) and error.param is not None and error.param.name
     hint = (
-        "-m FILE; `ncfix init` says it once for a folder" if lacks == "machine_path" and verb in PROJECT_VERBS else ""
+        "-m FILE, or name it once for a folder with `ncfix init`"
+        if lacks == "machine_path" and verb in PROJECT_VERBS
+        else ""
     )
     return failed(UsageError.of("NCF001", text, hint=hint or f"{command} --help"), as_json)
 

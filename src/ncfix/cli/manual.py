@@ -13,20 +13,20 @@ from ncfix.cli.main import VERBS, cli
 
 EXIT_CODES = (
     ("0", "done"),
-    ("1", "findings or differences"),
-    ("2", "wrong use, and outputs that cannot be written"),
+    ("1", "findings: faults, differences, or an error beyond the tolerance"),
+    ("2", "wrong use of the command line, or an output that cannot be written"),
     ("3", "unreadable input"),
-    ("4", "refused for safety"),
-    ("5", "a fault of ncfix or a plugin"),
+    ("4", "refused for safety; nothing was written"),
+    ("5", "internal fault of ncfix or of a plugin"),
     ("130", "after Ctrl-C"),
-    ("141", "the reader of standard output has gone"),
+    ("141", "the reader of standard output has closed it"),
 )
 ENVIRONMENT = (
     ("NCFIX_MACHINE, NCFIX_SETUP, NCFIX_OUTPUT, NCFIX_DIALECT", "defaults of the options of these names"),
     ("NCFIX_PROJECT", "the project file, instead of the ncfix.toml above the program"),
     ("NCFIX_CORE", "plain: do not use the compiled core; compiled: fail without it"),
-    ("NCFIX_PART_BYTES", "from what length on a program is corrected in parts"),
-    ("NCFIX_DEBUG", "1: show the traceback of a fault"),
+    ("NCFIX_PART_BYTES", "size in bytes from which a program is corrected in parts"),
+    ("NCFIX_DEBUG", "1: show the traceback of an internal fault"),
     ("NO_COLOR", "use no colours"),
 )
 SHARED = {

@@ -51,31 +51,41 @@ FIGURES["mean_reversal"] = "mean B"
 @click.argument("measured", type=PATH, nargs=-1, required=True)
 @machine_option
 @click.option(
-    "-o", "--output", type=PATH, metavar="FILE", required=True, help="Where to write the calibrated machine (TOML)."
+    "-o", "--output", type=PATH, metavar="FILE", required=True, help="File for the calibrated machine (TOML)."
 )
-@click.option("--effects", metavar="LIST", help="Names or patterns like EC0Y,E?X; all; or a model like esmaeili-13-bc.")
+@click.option(
+    "--effects",
+    metavar="LIST",
+    help="Errors to estimate: names or patterns like EC0Y,E?X; all; or a model like esmaeili-13-bc.",
+)
 @click.option(
     "--loss",
     type=click.Choice(LOSSES),
     default="auto",
     show_default=True,
-    help="How much outliers count: auto gives gross ones no weight and names them.",
+    help="Weight of outliers; auto: gross outliers get no weight and are named; none: all values get full weight.",
 )
 @click.option(
     "--prune",
     type=numbers(PRUNE),
     metavar="LEVEL",
-    help="Leave out coefficients that are not significant at this level, e.g. 0.999.",
+    help="Set coefficients to zero that are not significant at this level, e.g. 0.999.",
 )
 @click.option(
     "--knots",
     type=numbers(KNOTS),
     default=0,
     metavar="N",
-    help="New error motions of linear axes are parabolas that join at N knots, not cubics; see --prune.",
+    help="Describe new error motions of linear axes by parabolas that join at N knots instead of cubics; see --prune.",
 )
-@click.option("--time-constants", is_flag=True, help="Estimate the time constants of effects that lag, too.")
-@click.option("--allow-misfit", is_flag=True, help="Write the machine even if it does not describe the measurements.")
+@click.option(
+    "--time-constants",
+    is_flag=True,
+    help="Also estimate the time constants of effects that follow their input with a delay.",
+)
+@click.option(
+    "--allow-misfit", is_flag=True, help="Write the machine file although it does not describe the measurements."
+)
 @force_option
 @json_option
 def calibrate(
@@ -91,10 +101,11 @@ def calibrate(
     force: bool,
     as_json: bool,
 ) -> int:
-    """Estimate the errors of a machine from measurements and write the machine with them.
+    """Estimate the errors of a machine from the files MEASURED, and write the machine file with them.
 
-    Without --effects: the effects of the machine file; if it has none, all that can be estimated (of an arm, where its
-    joints lie). Exit code 4: the result does not describe the measurements, and nothing was written.
+    Without --effects, the effects of the machine file are estimated; if it has none, all that can be estimated (of an
+    arm: the location errors of its joints). Exit code 4: the result does not describe the measurements, and nothing was
+    written.
     """
     from ncfix.machine import dumps
     from ncfix.measure.reader import reads
@@ -235,28 +246,51 @@ def _say_bar(bar: dict[str, Any]) -> None:
 
 @click.command()
 @machine_option
-@click.option("--kind", type=click.Choice(PLANS), default="tcp", show_default=True, help="What will be measured.")
-@click.option("-n", "--count", type=numbers(POSES), default=40, show_default=True, help="How many poses.")
-@click.option("--effects", metavar="LIST", help="Effects to be determined, as for calibrate.")
-@click.option("--separate", metavar="EFFECT,EFFECT", help="Find poses that tell these effects apart.")
-@click.option("--existing", type=PATH, metavar="FILE", help="A measurement that the new poses complete.")
-@click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW,HIGH", help="Where the axis may go (repeatable).")
-@click.option("--tool-length", "lengths", multiple=True, type=ToolLength(), metavar="MM", help="A tool (repeatable).")
+@click.option("--kind", type=click.Choice(PLANS), default="tcp", show_default=True, help="Kind of measurement.")
+@click.option("-n", "--count", type=numbers(POSES), default=40, show_default=True, help="Number of poses.")
+@click.option("--effects", metavar="LIST", help="Errors to be determined, as for `ncfix calibrate`.")
+@click.option("--separate", metavar="EFFECT,EFFECT", help="Find poses that distinguish these effects.")
+@click.option("--existing", type=PATH, metavar="FILE", help="Measurement file that the new poses add to.")
+@click.option(
+    "--range",
+    "ranges",
+    multiple=True,
+    metavar="AXIS=LOW,HIGH",
+    help="Range of an axis, mm or degrees; default: its travel (repeatable).",
+)
+@click.option(
+    "--tool-length",
+    "lengths",
+    multiple=True,
+    type=ToolLength(),
+    metavar="MM",
+    help="Length of a tool or probe, mm; default: 100 (repeatable).",
+)
 @click.option(
     "--ball",
     "balls",
     multiple=True,
     metavar="NAME=X,Y,Z",
-    help="Where a ball stands, kinds probe and tcp (repeatable).",
+    help="Position of a ball, mm, for the kinds probe and tcp (repeatable).",
 )
 @click.option(
-    "--reach", "reaches", multiple=True, metavar="x=LOW,HIGH", help="Where the tip may be: x, y or z (repeatable)."
+    "--reach",
+    "reaches",
+    multiple=True,
+    metavar="x=LOW,HIGH",
+    help="Range of the tool tip along x, y or z of the workpiece, mm (repeatable).",
 )
 @click.option(
-    "--input", "inputs", multiple=True, metavar="NAME=LOW,HIGH", help="What else can be set, e.g. load_kg (repeatable)."
+    "--input",
+    "inputs",
+    multiple=True,
+    metavar="NAME=LOW,HIGH",
+    help="Range of an input that can be set, e.g. load_kg (repeatable).",
 )
-@click.option("--gcode", type=PATH, metavar="FILE", help="Also write a skeleton of the program that goes to the poses.")
-@click.option("--seed", type=numbers(SEED), default=0, help="Another seed gives other candidate poses.")
+@click.option(
+    "--gcode", type=PATH, metavar="FILE", help="Also write the skeleton of an NC program that goes to the poses."
+)
+@click.option("--seed", type=numbers(SEED), default=0, help="Seed of the candidate poses; default: 0.")
 @table_option
 @force_option
 @json_option
@@ -278,7 +312,7 @@ def plan(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Choose the poses to be measured, and write them as a measurement file to be filled in."""
+    """Choose the poses of a measurement, and write them as a measurement file to be filled in."""
     from ncfix.measure.candidates import Room
     from ncfix.measure.measurement import dumps
     from ncfix.measure.plan import skeleton
@@ -339,24 +373,26 @@ def _named(text: str, count: int, option: str) -> tuple[str, list[float]]:
     except ValueError:
         values = []
     if not equals or len(values) != count or not all(map(math.isfinite, values)):
-        raise click.BadParameter(f"{text!r} is not NAME= and {count} numbers", param_hint=option)
+        raise click.BadParameter(f"{text!r} should be NAME= and {count} numbers", param_hint=option)
     return name.strip(), values
 
 
 @click.command()
 @click.argument("measured", type=PATH, nargs=-1, required=True)
 @machine_option
+@click.option("-o", "--output", type=PATH, metavar="FILE", help="File for the machine with the effects added (TOML).")
+@click.option("--without", multiple=True, metavar="NAME", help="Effect that is not considered (repeatable).")
+@click.option("--since", is_flag=True, help="Find what has changed: the last file is compared with all before it.")
 @click.option(
-    "-o", "--output", type=PATH, metavar="FILE", help="Where to write the machine with the effects added (TOML)."
+    "--next",
+    "next_path",
+    type=PATH,
+    metavar="FILE",
+    help="File for the poses to be measured next: a plan if it ends in .csv, else an NC program.",
 )
-@click.option("--without", multiple=True, metavar="NAME", help="An effect that is not to be considered (repeatable).")
-@click.option("--since", is_flag=True, help="What changed: the last file against all before it.")
-@click.option(
-    "--next", "next_path", type=PATH, metavar="FILE", help="Write the poses to be measured next: CSV, else a program."
-)
-@click.option("--report", type=PATH, metavar="FILE", help="Write a report with figures (HTML or Markdown).")
-@click.option("--plot", type=PATH, metavar="FILE.svg|png|pdf", help="Draw what was found for a paper.")
-@click.option("--check", is_flag=True, help="Exit code 1 if anything is missing.")
+@click.option("--report", type=PATH, metavar="FILE", help="File for a report with figures (HTML or Markdown).")
+@click.option("--plot", type=PATH, metavar="FILE.svg|png|pdf", help="Write a picture of the result.")
+@click.option("--check", is_flag=True, help="Return exit code 1 if the model lacks anything.")
 @force_option
 @json_option
 def diagnose(
@@ -372,7 +408,7 @@ def diagnose(
     force: bool,
     as_json: bool,
 ) -> int:
-    """Say where machine and model disagree, name the effect that is missing, and add it to the model."""
+    """Compare the model of a machine with the files MEASURED, name the effects that it lacks, and add them."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
     from ncfix.cli.shop.pages import check_plot
     from ncfix.diagnosis.diagnosis import NOTHING

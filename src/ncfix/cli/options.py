@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from ncfix.text.dialect import Dialect
     from ncfix.text.tree import Program
 
-json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
-force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the text.")
+force_option = click.option("--force", is_flag=True, help="Replace the output if it exists.")
 
 
 class PathName(click.ParamType):  # type: ignore[type-arg]
@@ -86,7 +86,7 @@ optional_machine_option, machine_option = (
         metavar="FILE",
         required=required,
         envvar="NCFIX_MACHINE",
-        help="The machine file (TOML).",
+        help="Machine file (TOML).",
     )
     for required in (False, True)
 )
@@ -95,10 +95,15 @@ dialect_option = click.option(
     type=DIALECT,
     metavar="NAME",
     envvar="NCFIX_DIALECT",
-    help="The control's dialect; recognised if not given.",
+    help="Dialect of the program; default: recognised.",
 )
 table_option = click.option(
-    "-o", "--output", type=PATH, metavar="FILE", default=STREAM, help="Where to write the table (CSV)."
+    "-o",
+    "--output",
+    type=PATH,
+    metavar="FILE",
+    default=STREAM,
+    help="File for the table (CSV); default: standard output.",
 )
 
 
@@ -119,7 +124,7 @@ class Positive(click.ParamType):  # type: ignore[type-arg]
         if not 0 < found < math.inf:
             self.fail(f"{value!r} is not a number above zero", param, ctx)
         if found < self.least:
-            self.fail(f"{value!r} is less than {self.least:g}, the least that makes sense", param, ctx)
+            self.fail(f"{value!r} is below {self.least:g}, the smallest value accepted", param, ctx)
         return found
 
 
@@ -163,7 +168,7 @@ tolerance_option = click.option(
     type=Positive(TOLERANCE_UM.low),
     default=1.0,
     show_default=True,
-    help="How far the tool tip may leave the intended path.",
+    help="Largest distance of the tool tip from the intended path, um.",
 )
 
 
@@ -184,7 +189,7 @@ def sound(machine: Machine, path: str, force: bool) -> Machine:
     if force:
         console.tell(*(doubt.message for doubt in doubts(machine, shown(path))))
     else:
-        console.tell(*required(machine, shown(path), "--force makes it all the same"))
+        console.tell(*required(machine, shown(path), "--force uses the machine file as it is"))
     return machine
 
 

@@ -54,7 +54,9 @@ def _whole(following: FollowingSetup, source: Source, flatten: bool) -> Found:
 @optional_machine_option
 @dialect_option
 @setup_options
-@click.option("--flatten", is_flag=True, help="With a machine file: find what `fix --flatten` would still refuse.")
+@click.option(
+    "--flatten", is_flag=True, help="With a machine file: find what `ncfix fix --flatten` would still refuse."
+)
 @project_options
 @json_option
 def check(
@@ -65,14 +67,16 @@ def check(
     flatten: bool,
     as_json: bool,
 ) -> int:
-    """Read each PROGRAM, of a folder all below it, and follow it as the control would. Writes nothing.
+    """Read each PROGRAM and follow it as the control would; for a folder, all programs in it and below. Writes nothing.
 
-    With a machine file also: does it stay within the travel, and what would its correction refuse? Exit code 1 with
+    With a machine file it also checks the travel, and lists what a correction would refuse. Exit code 1: there are
     findings.
     """
     following = FollowingSetup.of(machine_path, dialect, given)
     if flatten and following.machine is None:
-        raise UsageError.of("NCF001", "--flatten is for what a correction would refuse", hint="-m FILE")
+        raise UsageError.of(
+            "NCF001", "--flatten needs a machine file: without one nothing is corrected", hint="-m FILE"
+        )
     context = click.get_current_context()
     only, outcomes = group_of(context).programs, context.meta.setdefault(OUTCOMES, [])
     wanted = (each for each in program_files(programs) if only is None or each.path in only)
@@ -126,7 +130,7 @@ def trace(
     given: SetupOptions,
     as_json: bool,
 ) -> None:
-    """Print the motions of PROGRAM as a table: where each leads, in machine axes and at the tool tip."""
+    """Print the motions of PROGRAM as a table, with the end of each in machine axes and at the tool tip."""
     (target,) = targets([program], Outputs(output, force=force), (machine_path, *given.files))
     following = FollowingSetup.of(machine_path, dialect, given)
     with source_of(program) as source, ExitStack() as opened:

@@ -31,10 +31,12 @@ OF_FIX = ("dialect", "strategy", "tolerance_um", "split_rapids", "flatten")
 @click.command()
 @click.argument("sources", type=PATH, nargs=-1, required=True, metavar="PROGRAM|MACHINE|RESULT...")
 @click.option(
-    "-m", "--machine", "machine_path", type=PATH, metavar="FILE", help="The machine on which PROGRAM is corrected."
+    "-m", "--machine", "machine_path", type=PATH, metavar="FILE", help="Machine file for which PROGRAM is corrected."
 )
-@click.option("-o", "--output", type=PATH, metavar="FILE", required=True, help="The page: FILE.html or FILE.md.")
-@click.option("--plot", type=PATH, metavar="FILE.svg|png|pdf", help="Draw the errors of PROGRAM for a paper, too.")
+@click.option(
+    "-o", "--output", type=PATH, metavar="FILE", required=True, help="File for the page: FILE.html or FILE.md."
+)
+@click.option("--plot", type=PATH, metavar="FILE.svg|png|pdf", help="Also write a picture of the errors of PROGRAM.")
 @force_option
 @setup_options
 def report(
@@ -46,11 +48,11 @@ def report(
     given: SetupOptions,
     **options: Any,
 ) -> None:
-    """Make one page of machine files and of results (what other commands print with --json); with -m, of a program.
+    """Write one page about machine files and results (the output of other verbs with --json); with -m, about a program.
 
-    Of a machine: its chain, its errors with their curves and uncertainty, and how far they lead the tool tip. Of a
-    result: its tables; of a batch, a list to sort and filter. Of a program: its path with the errors before and after
-    a correction, which is not written.
+    For a machine: its axes, the curves of its errors with their uncertainty, and the error of the tool tip. For a
+    result: its tables; for a batch, a list that can be sorted and filtered. For a program: its path with the errors
+    before and after a correction; the corrected program is not written.
     """
     if machine_path is not None:
         _report_program(sources, machine_path, output, plot, force, given, options)
@@ -58,7 +60,7 @@ def report(
     context = click.get_current_context()
     named = [name for name in context.params if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
     if set(named) - {"sources", "output", "force"}:
-        hint = "a project file is not looked for here: `ncfix fix PROGRAM --report FILE.html` takes what it says"
+        hint = "`ncfix report` does not read a project file; `ncfix fix PROGRAM --report FILE.html` does"
         raise UsageError.of("NCF001", "options of a program need -m MACHINE", hint=hint)
     from ncfix.reports.document import Document
     from ncfix.reports.rendering import form_of
@@ -103,8 +105,8 @@ def _report_program(
     from ncfix.compensate import FixOptions
 
     if len(sources) > 1:
-        hint = "ncfix fix FOLDER -o FOLDER --report FILE.html has pages of many"
-        raise UsageError.of("NCF001", "with -m there is one program on a page", hint=hint)
+        hint = "ncfix fix FOLDER -o FOLDER --report FILE.html makes pages of several programs"
+        raise UsageError.of("NCF001", "with -m, a page shows one program", hint=hint)
     target = OutputTarget(sources[0], output)
     pages = Pages.of(output, plot, False, force, [OutputTarget(sources[0], STREAM)], (machine_path, *given.files))
     machine = sound(load_machine(machine_path), machine_path, force)
@@ -134,12 +136,14 @@ def _result(text: bytes, path: str) -> dict[str, Any]:
         _check_depth(found)
     except ValueError as error:
         hint = "give what a verb printed with --json, or a machine file"
-        raise SourceError.of("NCF019", f"is not a result: {error}", Place(shown(path)), hint) from error
+        raise SourceError.of("NCF019", f"is not a result of ncfix: {error}", Place(shown(path)), hint) from error
     except RecursionError as error:
         hint = "give what a verb printed with --json"
-        raise SourceError.of("NCF019", "is no result: it is nested too deeply", Place(shown(path)), hint) from error
+        raise SourceError.of(
+            "NCF019", "is not a result of ncfix: its JSON is nested too deeply", Place(shown(path)), hint
+        ) from error
     if not isinstance(found, dict) or found.get("schema") != console.SCHEMA:
-        problem = f'is JSON, but no result: it has no "schema": {console.SCHEMA}'
+        problem = f'is JSON, but not a result of ncfix: it has no "schema": {console.SCHEMA}'
         raise SourceError.of("NCF019", problem, Place(shown(path)), "give what a verb printed with --json")
     return found
 

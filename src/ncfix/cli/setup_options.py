@@ -45,7 +45,7 @@ class KeyValue(click.ParamType):  # type: ignore[type-arg]
         key = key.strip() if self.blanks else "".join(key.split())
         key = key.upper() if self.upper else key
         if not equals:
-            self.fail(f"{value!r} has no =; it reads like {self.name}", param, ctx)
+            self.fail(f"{value!r} has no =; write it like {self.name}", param, ctx)
         try:
             return key, self.convert_value(key, text)
         except ValueError as error:
@@ -71,20 +71,20 @@ def offset_values(name: str, text: str) -> dict[str, float]:
     if all(AXIS.match(part.upper()) for part in parts):
         letters = [part[0].upper() for part in parts]
         if len(set(letters)) < len(letters):
-            raise ValueError("an axis is there twice")
+            raise ValueError("an axis is named twice")
         return {letter: number(part[1:].removeprefix("=")) for letter, part in zip(letters, parts, strict=True)}
     if not 1 <= len(parts) <= len(OFFSET_AXES):
-        raise ValueError(f"{len(parts)} numbers, at most {len(OFFSET_AXES)} axes")
+        raise ValueError(f"{len(parts)} numbers, but there are at most {len(OFFSET_AXES)} axes")
     return dict(zip(OFFSET_AXES, map(number, parts), strict=False))
 
 
 def tool_values(name: str, text: str) -> tuple[float, ...]:
     """The length of a tool, and its radius if given."""
     if (len(name) < 2 and not name.isdecimal()) or re.fullmatch(r"T\d+|[-+][\d.]+", name):
-        raise ValueError(f"{name!r} is not a tool number, nor a name")
+        raise ValueError(f"{name!r} is neither a tool number nor a tool name")
     values = tuple(map(number, text.split(",")))
     if len(values) > 2:
-        raise ValueError("a length, and a radius if wanted")
+        raise ValueError("give a length, or a length and a radius")
     if len(values) == 2 and "." not in text:
         one, both = text.replace(",", "."), text.replace(",", ".0,")
         raise ValueError(f"{text!r} may have a decimal comma: {one} is a length, {both}.0 a length and a radius")
@@ -105,7 +105,7 @@ class AxisValues(click.ParamType):  # type: ignore[type-arg]
                 if not equals or not AXIS.fullmatch(letter):
                     raise ValueError(f"{part.strip()!r} is not an axis and a number")
                 if letter in found:
-                    raise ValueError(f"{letter} is there twice")
+                    raise ValueError(f"axis {letter} is given twice")
                 found[letter] = number(text)
             except ValueError as error:
                 self.fail(f"{value!r}: {error}; it reads like {self.name}", param, ctx)
@@ -124,7 +124,7 @@ class Switches(click.ParamType):  # type: ignore[type-arg]
             return value if said is None else said
         parts = [part.strip().removeprefix("/") for part in value.split(",")]
         if not all(re.fullmatch(r"[0-9]", part) for part in parts):
-            self.fail(f"{value!r} is neither on, off nor both, nor numbers of switches like 2,3", param, ctx)
+            self.fail(f"{value!r} is none of on, off and both, and no list of switch numbers like 2,3", param, ctx)
         return frozenset(map(int, parts))
 
 
@@ -135,34 +135,34 @@ OPTIONS = (
         type=PATH,
         metavar="FILE",
         envvar="NCFIX_SETUP",
-        help="Work offsets, tools and start position (TOML).",
+        help="Setup file with work offsets, tools and start position (TOML).",
     ),
     click.option(
         "--offset",
         "offsets",
         type=KeyValue("G54=0,0,-300", offset_values, blanks=False),
         multiple=True,
-        help="A work offset in the order X Y Z A B C, mm and degrees (repeatable).",
+        help="Work offset in the order X Y Z A B C, mm and degrees (repeatable).",
     ),
     click.option(
         "--tool",
         "tools",
         type=KeyValue("12=120.0", tool_values),
         multiple=True,
-        help="The length of a tool, mm; and its radius, as 12=120.0,5.0 (repeatable).",
+        help="Length of a tool, mm; with radius: 12=120.0,5.0 (repeatable).",
     ),
-    click.option("--tool-table", "tool_table", type=PATH, metavar="FILE", help="The control's own tool table."),
+    click.option("--tool-table", "tool_table", type=PATH, metavar="FILE", help="Tool table of the control."),
     click.option(
         "--tool-unit",
         type=click.Choice(("mm", "inch")),
         metavar="[mm|inch]",
-        help="The unit of a tool table that names none (default: mm).",
+        help="Unit of a tool table that does not state it; default: mm.",
     ),
     click.option(
         "--initial",
         type=AxisValues(),
         multiple=True,
-        help="Where the axes are at the start, machine coordinates (repeatable).",
+        help="Start position of axes, machine coordinates, mm and degrees (repeatable).",
     ),
     click.option(
         "--input",
@@ -170,35 +170,40 @@ OPTIONS = (
         type=KeyValue("temp_spindle=24.5", lambda key, text: number(text), upper=False),
         multiple=True,
         metavar="temp_spindle=24.5",
-        help="What the machine's errors depend on besides its axes (repeatable).",
+        help="Value of an input of the error model, e.g. a temperature in degrees C (repeatable).",
     ),
     click.option(
         "--no-point",
         type=click.Choice(("calculator", "IS-A", "IS-B", "IS-C"), case_sensitive=False),
         metavar="[calculator|IS-A|IS-B|IS-C]",
-        help="What a number without a decimal point means: units, or least increments (IS-B: X50 is 0.050 mm).",
+        help="Meaning of a number without decimal point: mm or inch (calculator), or least increments (IS-B: X50 is "
+        "0.050 mm).",
     ),
     click.option(
         "--subprograms",
         type=click.Path(exists=True, file_okay=False),
         multiple=True,
         metavar="DIR",
-        help="Where else than beside the program subprograms are looked for (repeatable).",
+        help="Folder with subprograms, besides that of the program (repeatable).",
     ),
     click.option(
         "--probed",
         type=AxisValues(),
         multiple=True,
-        help="Where probing nominally ends, in coordinates of the program; its results count as known (repeatable).",
+        help="Nominal end of probing, program coordinates; its results then count as known (repeatable).",
     ),
     click.option(
         "--block-skip",
         type=Switches(),
         metavar="[both|on|off|2,3]",
-        help="Blocks with / are skipped (on), executed (off), or may be either (both, the default); "
-        "or the numbers of the switches that are on.",
+        help="Position of the block delete switches: on (blocks with / are skipped), off, both (default: right in "
+        "every position), or the numbers of the switches that are on.",
     ),
-    click.option("--assume-zero", is_flag=True, help="What is used and not given is zero; each is named in a warning."),
+    click.option(
+        "--assume-zero",
+        is_flag=True,
+        help="Take offsets, tool lengths and start positions that are not given as zero, with a warning for each.",
+    ),
 )
 
 
@@ -243,7 +248,7 @@ class SetupOptions:
             axes = OTHER_AXES if machine is None else machine.axis_names
             found = load_tool_table(self.tool_table, axes, self.tool_unit or "mm")
             if self.tool_unit is None and (doubt := may_be_in_inches(found)):
-                tell(Message("NCF386", doubt, Place(self.tool_table), "--tool-unit inch if it is, else --tool-unit mm"))
+                tell(Message("NCF386", doubt, Place(self.tool_table), "give --tool-unit inch or --tool-unit mm"))
             tools |= {key: tool for key, tool in found.items() if isinstance(key, int)}
             named |= {key: tool for key, tool in found.items() if isinstance(key, str)}
         given = {key.strip('"'): Tool(values[0], values[1] if len(values) > 1 else None) for key, values in self.tools}

@@ -35,15 +35,36 @@ OF_PLANS = ("noise_um", "drift_um", "quantum_um", "setup_error", "seed")
 
 @click.command(cls=TableCommand)
 @machine_option
-@click.option("--program", type=PATH, metavar="FILE", help="The program that the machine runs.")
-@click.option("--plan", type=PATH, metavar="FILE", help="Poses to be measured, as `ncfix plan` writes them (CSV).")
-@click.option("--noise-um", type=NOT_NEGATIVE, default=0.0, help="Noise of a measured length (with --plan).")
-@click.option("--drift-um", type=NOT_NEGATIVE, default=0.0, help="Largest drift over the measurement (with --plan).")
-@click.option("--quantum-um", type=NOT_NEGATIVE, default=0.0, help="Step of the instrument (with --plan).")
-@click.option("--setup-error", type=NOT_NEGATIVE, default=1.0, help="How far the set-up is off (with --plan).")
-@click.option("--seed", type=numbers(SEED), default=0, help="Another seed gives other noise (with --plan).")
+@click.option("--program", type=PATH, metavar="FILE", help="Program that the machine runs.")
+@click.option("--plan", type=PATH, metavar="FILE", help="Measurement plan to fill in, as `ncfix plan` writes it (CSV).")
 @click.option(
-    "-o", "--output", type=PATH, metavar="FILE", help="Write the error along the path, or the measurement (CSV)."
+    "--noise-um",
+    type=NOT_NEGATIVE,
+    default=0.0,
+    help="Standard deviation of a measured length, um (with --plan; default 0).",
+)
+@click.option(
+    "--drift-um",
+    type=NOT_NEGATIVE,
+    default=0.0,
+    help="Largest drift of a length over the measurement, um (with --plan; default 0).",
+)
+@click.option(
+    "--quantum-um", type=NOT_NEGATIVE, default=0.0, help="Resolution of the instrument, um (with --plan; default 0)."
+)
+@click.option(
+    "--setup-error",
+    type=NOT_NEGATIVE,
+    default=1.0,
+    help="Size of the unknown set-up: 1 as usual for the instrument (default), 0 none (with --plan).",
+)
+@click.option("--seed", type=numbers(SEED), default=0, help="Seed of the noise (with --plan; default 0).")
+@click.option(
+    "-o",
+    "--output",
+    type=PATH,
+    metavar="FILE",
+    help="File for the error along the path, or for the filled-in measurement (CSV).",
 )
 @force_option
 @dialect_option
@@ -65,12 +86,12 @@ def simulate(
     given: SetupOptions,
     as_json: bool,
 ) -> None:
-    """Say how far the tool tip of this machine is from where the program means it to be, along the whole path.
+    """Compute the error of the tool tip along the whole path of an uncorrected program.
 
-    With --plan: fill in a measurement plan as this machine would be measured, with noise and the faults of measuring.
+    With --plan: fill in a measurement plan with simulated readings of this machine, with noise and drift.
     """
     if (program is None) == (plan is None):
-        raise click.UsageError("give either --program or --plan")
+        raise click.UsageError("give --program or --plan, and only one of them")
     _check_apt(of_plan=plan is not None, of_program=dialect is not None or given != SetupOptions())
     if plan is not None:
         from ncfix.measure.instruments import Faults
@@ -109,7 +130,7 @@ def _check_apt(of_plan: bool, of_program: bool) -> None:
         raise click.UsageError(f"--{named[0].replace('_', '-')} is for a measurement (--plan), not for a program")
     if of_plan and of_program:
         raise click.UsageError(
-            "--dialect and the options of the set-up are for a program; a plan has columns for states (temp_x, ...)"
+            "--dialect and the options of the setup are for a program; a plan has columns for inputs (temp_x, ...)"
         )
 
 

@@ -33,7 +33,7 @@ def part_bytes() -> int:
 
     text = os.environ.get("NCFIX_PART_BYTES") or str(PART_BYTES)
     if not text.isdecimal() or int(text) < 1:
-        raise UsageError.of("NCF001", f"NCFIX_PART_BYTES is {text!r}, and not a number of bytes", hint="unset it")
+        raise UsageError.of("NCF001", f"NCFIX_PART_BYTES is {text!r}, not a number of bytes", hint="unset it")
     return int(text)
 
 
@@ -104,7 +104,7 @@ class Source:
         began, now = self.began, os.fstat(self.handle.fileno()) if self.began else None
         if began and now and (now.st_size, now.st_mtime_ns) != (began.st_size, began.st_mtime_ns):
             text = "was changed while it was read"
-            raise SourceError.of("NCF002", text, Place(shown(self.path)), "fix it again when it is whole")
+            raise SourceError.of("NCF002", text, Place(shown(self.path)), "run it again when the file is complete")
 
     def looked_into(self, named: bool = False) -> bool:
         """Read the first bytes, which `read` will return again; returns whether the program is long.
@@ -213,7 +213,7 @@ class Outlet:
     def after(self, text: bytes, path: str) -> bytes:
         """The rest of a text whose beginning was sent; raises RefusedError NCF013 if what was sent differs."""
         if hashlib.sha256(text[: self.sent]).digest() != self.digest.digest():
-            problem = "what has been written to the pipe already would have to be different"
+            problem = "a later block changes what has already been written to the pipe"
             raise RefusedError.of(
                 "NCF013", problem, Place(shown(path)), "give the program as a file, not through a pipe"
             )

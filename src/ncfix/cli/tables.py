@@ -47,28 +47,43 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("control", type=CONTROL)
 @machine_option
-@click.option("-o", "--output", type=FOLDER, metavar="DIR", required=True, help="The folder for the files.")
+@click.option("-o", "--output", type=FOLDER, metavar="DIR", required=True, help="Folder for the files.")
 @click.option(
-    "--tool-length", type=ToolLength(), default=0.0, show_default=True, help="The length that the tables hold for, mm."
+    "--tool-length",
+    type=ToolLength(),
+    default=0.0,
+    show_default=True,
+    help="Tool length for which the tables are computed, mm.",
 )
 @click.option(
     "--target-um",
     type=Positive(TARGET_UM.low),
     default=1.0,
     show_default=True,
-    help="How far the tables may be off between their points, um.",
+    help="Largest error of the tables between their points, um.",
 )
 @click.option(
     "--range",
     "ranges",
     metavar="X=LOW,HIGH",
     multiple=True,
-    help="Cover less than the travel; mm, degree (repeatable).",
+    help="Range of an axis, mm or degrees; default: its travel (repeatable).",
 )
-@click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="An option of the control (repeatable).")
-@click.option("--probe", is_flag=True, help="Write small files that settle on the machine what --set must say.")
 @click.option(
-    "--program", type=PATH, metavar="FILE", help="Rewrite this program (control gcode), or run it with the tables."
+    "--set",
+    "settings",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Setting of the control; docs/controllers.md lists them (repeatable).",
+)
+@click.option(
+    "--probe", is_flag=True, help="Write test files with which the machine shows the values that --set needs."
+)
+@click.option(
+    "--program",
+    type=PATH,
+    metavar="FILE",
+    help="Program that is run with the tables; with the control gcode: that is rewritten.",
 )
 @force_option
 @dialect_option
@@ -89,9 +104,9 @@ def export(
     given: SetupOptions,
     as_json: bool,
 ) -> int:
-    """Write compensation tables for CONTROL, with a hand-over sheet and what they leave.
+    """Write compensation tables for CONTROL, with a hand-over sheet that states the remaining error.
 
-    The figures are those of the files: they are read back and run as the control would, over 20000 random poses.
+    The remaining error is that of the files: they are read back and run as the control would, at 20000 random poses.
     """
     from ncfix.api.tables import table_request
     from ncfix.plugins import called
@@ -155,7 +170,7 @@ def given_ranges(machine: Machine, texts: tuple[str, ...]) -> dict[str, tuple[fl
 def _pair(text: str, form: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not equals or not name:
-        raise click.UsageError(f"{text!r} should be {form}")
+        raise click.UsageError(f"{text!r} should be of the form {form}")
     return name.strip(), value.strip()
 
 
@@ -182,7 +197,7 @@ def tell(made: Exported, control: Control, as_json: bool) -> None:
         for remark in program.remarks:
             console.say(remark)
         if (program.after["rms"] or 0.0) > (program.before["rms"] or 0.0):
-            console.say("This program is made worse: it runs where these tables do not fit the machine.")
+            console.say("The tables make this program worse: it runs where they do not match the machine.")
     for note in made.notes:
         console.say(note)
 
@@ -191,8 +206,8 @@ def tell(made: Exported, control: Control, as_json: bool) -> None:
 @click.argument("control", type=CONTROL)
 @click.argument("folder", type=FOLDER, metavar="TABLEDIR")
 @machine_option
-@click.option("--program", type=PATH, metavar="FILE", help="Also run this program with the tables active.")
-@click.option("--other-machine", is_flag=True, help="Run tables that were made for another machine or other errors.")
+@click.option("--program", type=PATH, metavar="FILE", help="Program that is run with the tables active.")
+@click.option("--other-machine", is_flag=True, help="Accept tables that were made for another machine or other errors.")
 @dialect_option
 @setup_options
 @json_option
@@ -206,9 +221,9 @@ def emulate(
     given: SetupOptions,
     as_json: bool,
 ) -> int:
-    """Run the tables in TABLEDIR, which `ncfix export` wrote for CONTROL, and say what error they leave.
+    """Run the tables in TABLEDIR, which `ncfix export` wrote for CONTROL, and compute the remaining error.
 
-    Exit code 1 if there is something to remark on the files.
+    Exit code 1: there are remarks on the files.
     """
     from ncfix.tables.control import get_control
 
@@ -243,13 +258,13 @@ def _below(folder: str, messages: Iterable[Message], names: Container[str]) -> t
 
 @click.command()
 @click.argument("paths", nargs=-1, required=True, metavar="FILE...")
-@click.option("--control", metavar="NAME", default="", help="The control that they are for; recognised if not given.")
+@click.option("--control", metavar="NAME", default="", help="Control that the tables are for; default: recognised.")
 @json_option
 def lint(paths: tuple[str, ...], control: str, as_json: bool) -> int:
-    """Find what a control would not load, or would misread, in each FILE, or in all files of a folder.
+    """Find what the control would not load or would misread in each FILE, or in all files of a folder.
 
-    Files of one control that lie in one folder are looked at together. Exit code 1 with findings, 3 if a file is of no
-    known form.
+    Files of one control in one folder are checked together. Exit code 1: there are findings; 3: a file has no known
+    form.
     """
     from ncfix.tables.forms import lint_files
 

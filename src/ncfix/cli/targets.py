@@ -46,7 +46,7 @@ def stdin() -> IO[bytes]:
     except OSError as error:
         raise files.unreadable(shown(STREAM), error) from error
     if stream in _TAKEN:
-        text = "standard input is to be two inputs, and can only be read once"
+        text = "standard input is given for two inputs, but can be read only once"
         raise UsageError.of("NCF022", text, hint="give one of them as a file")
     _TAKEN.add(stream)
     return stream
@@ -111,8 +111,8 @@ class OutputTarget:
         elif self.resume and not self.force and os.path.lexists(self.path):
             if not files.holds(self.path, data):
                 if not self.is_own:
-                    text = "exists already, and is not what ncfix has written for this program"
-                    raise UsageError.of("NCF004", text, Place(self.path), "--force replaces it; or move it away")
+                    text = "exists already, and is not the output that ncfix wrote for this program"
+                    raise UsageError.of("NCF004", text, Place(self.path), "move it away, or replace it with --force")
                 files.write_whole(self.path, data, True, self.root, mode)
         else:
             files.write_whole(self.path, data, self.force, self.root, mode)
@@ -161,9 +161,11 @@ def targets(
     folder = outputs.folder(given)
     check_named(outputs.output)
     if outputs.in_place and outputs.output is not None:
-        raise UsageError.of("NCF011", "--in-place and -o contradict each other", hint="leave one of them out")
+        raise UsageError.of("NCF011", "--in-place and -o contradict each other", hint="use one of them")
     if outputs.resume and folder is None:
-        raise UsageError.of("NCF016", "--resume goes on with a folder of outputs, and there is none", hint="-o FOLDER")
+        raise UsageError.of(
+            "NCF016", "--resume continues with a folder of outputs, but no folder is given", hint="-o FOLDER"
+        )
     programs = (
         program_files(given, folder) if folders else [ProgramFile(path, os.path.basename(path)) for path in given]
     )
@@ -204,7 +206,9 @@ def _target(program: ProgramFile, outputs: Outputs, folder: str | None) -> Outpu
     if folder is not None:
         if program.path == STREAM:
             hint = f"-o {os.path.join(folder, 'NAME')}"
-            raise UsageError.of("NCF003", "standard input has no name to be written under", Place(folder), hint)
+            raise UsageError.of(
+                "NCF003", "the output in a folder needs a file name, and standard input has none", Place(folder), hint
+            )
         path = os.path.join(folder, program.name)
         how = (False, outputs.force, outputs.resume, program.name, folder)
         return OutputTarget(program.path, path, *how, program=program)
@@ -223,7 +227,7 @@ def _check_clash(found: Sequence[OutputTarget]) -> None:
             sources = ", ".join(target.source for target in group)
             text = f"is the output of {len(group)} inputs: {sources}"
             if len({target.path for target in group}) > 1:
-                text = "has the same name as another output, but for large and small letters or how they are composed"
+                text = "differs from another output only in upper and lower case, or in how accented letters are coded"
                 text += f"; of these inputs: {sources}"
             hint = "fix them one by one, or into different folders"
             raise UsageError.of("NCF006", text, Place(group[1].path), hint)
@@ -235,5 +239,5 @@ def _check_in_place(target: OutputTarget) -> None:
         raise UsageError.of("NCF005", "standard input cannot be changed in place", hint="-o FILE")
     check_output(target.path)
     if os.path.lexists(target.backup):
-        hint = "remove it, or bring it back and fix that"
-        raise UsageError.of("NCF008", f"was fixed in place before: {target.backup} exists", place, hint)
+        hint = "rename it back to the program and fix that, or remove it"
+        raise UsageError.of("NCF008", f"was already fixed in place: {target.backup} exists", place, hint)

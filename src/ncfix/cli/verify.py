@@ -110,10 +110,13 @@ def compared(following: FollowingSetup, original: str, fixed: str, tolerance_um:
     "--certificate",
     type=PATH,
     metavar="FILE",
-    help="Instead, let an independent reader prove FIXED; write what it finds (JSON).",
+    help="Prove FIXED with an independent reader instead; write its certificate (JSON).",
 )
 @click.option(
-    "--against", type=PATH, metavar="FILE", help="Check that this certificate belongs to these files and still holds."
+    "--against",
+    type=PATH,
+    metavar="FILE",
+    help="Check that this certificate belongs to these files and is still valid.",
 )
 @project_options
 @json_option
@@ -128,10 +131,10 @@ def verify(
     against: str | None,
     as_json: bool,
 ) -> int:
-    """Compare what this machine cuts with FIXED with what ORIGINAL means, along the whole path.
+    """Compare the path of the tool tip under FIXED on this machine with the intended path of ORIGINAL.
 
-    Exit code 1 if the tool tip leaves the intended path by more than the tolerance and what the control's digits
-    add, or if a part of the path that may cut could not be looked at.
+    Exit code 1: the tool tip leaves the intended path by more than the tolerance plus the rounding to the control's
+    digits, or a part of the path that may cut could not be examined.
     """
     following = FollowingSetup.of(machine_path, dialect, given)
     if certificate is not None or against is not None:
@@ -172,10 +175,10 @@ def verdict(found: Compared, tolerance_um: float) -> Iterator[str]:
     if found.no_figure:
         yield console.no_figure(found.no_figure)
     if found.unseen:
-        yield f"not looked at: {lines_said(found.unseen)} of the original; where they cut is not known"
-    limits = f"{tolerance_um:g} um and {found.rounding_um:.2f} um of the control's digits"
+        yield f"not examined: {lines_said(found.unseen)} of the original; their position is not known"
+    limits = f"{tolerance_um:g} um, plus {found.rounding_um:.2f} um for the control's digits"
     if found.within and found.after["max"] is None:
-        yield "nothing cuts: there is nothing to compare"
+        yield "no motion cuts: there is nothing to compare"
         return
     if not found.beyond_somewhere:
         yield f"within {limits}" if found.within else unsure(limits)
@@ -184,12 +187,12 @@ def verdict(found: Compared, tolerance_um: float) -> Iterator[str]:
     yield f"NOT within {limits}: {lines_said(found.beyond or found.not_reached)}{of}"
     for axis, lines in found.left.items():
         where = f"{lines_said(lines)} of the original"
-        yield f"along {axis} nothing can be corrected in {where}: the program has not said where {axis} stands there"
+        yield f"{axis} cannot be corrected in {where}: the program has not given the position of {axis} there"
 
 
 def unsure(limits: str) -> str:
     """The verdict if all examined motions are right, but not all could be examined."""
-    return f"NOT known to be within {limits}: what was looked at is, and the rest may not be"
+    return f"NOT known to be within {limits}: all examined motions are, but some could not be examined"
 
 
 def lines_said(lines: Sequence[int]) -> str:

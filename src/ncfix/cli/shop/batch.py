@@ -41,11 +41,13 @@ if TYPE_CHECKING:
     from ncfix.reports.program_page import ProgramPage
     from ncfix.text.dialect import Dialect
 
-FLATTEN = "--flatten may correct more: it writes out what cycles, loops and subprograms repeat; "
+FLATTEN = "--flatten may correct more: it writes cycles, loops and subprograms out as single blocks; "
 REPEATED = "NCF433"
 """Code of a refusal because a block is executed several times, or because it affects such a block."""
-STALE = "is of an earlier state of the program, the machine, the set-up or the options, and was left as it is"
-ACCEPT = "--allow-refused writes the program with the refused motions as they were"
+STALE = (
+    "is out of date: the program, the machine file, the setup or the options have changed since; it was not replaced"
+)
+ACCEPT = "--allow-refused writes the program; the refused motions stay uncorrected"
 OF_PROGRAMS = 100
 """Smallest number of message codes on programs, machines and setups; lower ones are on files and usage."""
 LASTING = frozenset({"NCF017", "NCF024", "NCF030"})
@@ -237,7 +239,7 @@ class FixJob:
             assert isinstance(fixed.text, bytes)
             return replace(fixed, text=outlet.after(fixed.text, source.path))
         except WorkerGoneError:
-            text = "one of the processes that worked on it was killed"
+            text = "one of the processes that corrected it was killed"
             raise FaultError.of("NCF017", text, Place(shown(source.path)), "fix it with --jobs 1") from None
         source.check_unchanged()
         report = self._remarked(done.report, dialect)
@@ -328,12 +330,14 @@ def _summary(entry: dict[str, Any], refused: bool, errors: bool) -> list[str]:
         lines.append(f"  largest correction  {entry['max_correction_um']:.1f} um")
     if entry["error_before_um"] and entry["error_before_um"]["max"] is None:
         if entry["compensated"]:
-            lines.append("  tip error           no figure: nothing that cuts was corrected")
+            lines.append("  tip error           not computed: no cutting motion was corrected")
     elif entry["error_before_um"]:
         lines.append(f"  tip error before    {console.error_figures(entry['error_before_um'])}")
         lines.append(f"  tip error after     {console.error_figures(entry['error_after_um'])}")
     if entry["compensated"]:
-        lines.append(f"  rounding            up to {entry['rounding_um']:.2f} um of that are the control's digits")
+        lines.append(
+            f"  rounding            up to {entry['rounding_um']:.2f} um of this come from the control's digits"
+        )
     if entry["no_figure"]:
         lines.append(f"  {console.no_figure(entry['no_figure'])}")
     if entry["leaves"]:
@@ -441,13 +445,13 @@ def _note(journal: Journal, limits: str, target: OutputTarget, finished: Finishe
 def _done_before(target: OutputTarget, record: JournalRecord) -> Finished:
     entry = {**record.entry, "path": shown(target.source), "resumed": True}
     entry["output"] = target.path if record.digest else None
-    line = f"{visible(shown(target.source))} -> {visible(target.path)}: done before"
+    line = f"{visible(shown(target.source))} -> {visible(target.path)}: done before, unchanged"
     outcome = FixOutcome(record.code, entry, record.called)
     return outcome, [line] if record.digest else [brief(entry)]
 
 
 def _lost(target: OutputTarget) -> Finished:
     """The result of a program whose worker died twice: too little memory, or a bug in compiled code."""
-    text = "the process that worked on it was killed, and so was another one"
-    error = FaultError.of("NCF017", text, Place(shown(target.source)), "fix it alone, where there is more memory")
+    text = "the process that corrected it was killed, and so was that of the second attempt"
+    error = FaultError.of("NCF017", text, Place(shown(target.source)), "fix it alone, on a computer with more memory")
     return FixOutcome.failed(target, error), [str(message) for message in error.messages]

@@ -65,7 +65,7 @@ def _cards(entries: Sequence[Entry], summary: Summary) -> Iterator[str]:
     if all(figures):
         before, after = map(max, figures)
         value = f'<span class="from">{before:.2f}</span> → <span class="to">{after:.2f}</span>'
-        yield card(value, "largest tip error of all, µm, before → after")
+        yield card(value, "largest tip error of all programs, µm, before → after")
     yield card(str(sum(entry.get("compensated", 0) for entry in entries)), "motion blocks corrected")
     yield card(str(sum(len(entry.get("refused", ())) for entry in entries)), "motion blocks refused")
 
@@ -83,7 +83,7 @@ def _totals(summary: Summary) -> str:
     rows = [row(each["programs"], each["outcome"], each["code"] or "", each["outcome"]) for each in found["outcomes"]]
     remarks = sorted(found["remarks"].items(), key=lambda item: (-item[1], item[0]))
     rows += [row(count, "with remark", code, "") for code, count in remarks]
-    return table(("programs", "outcome", "reason", "what it means", ""), rows, right=(0,))
+    return table(("programs", "outcome", "reason", "explanation", ""), rows, right=(0,))
 
 
 def _programs(entries: Sequence[Entry], folder: str) -> str:

@@ -105,6 +105,6 @@ def certify_output(proving: Proving, target: OutputTarget) -> dict[str, Any]:
     console.say(f"  certificate         {found['verdict']}, {counts}: {path}")
     if found["verdict"] == FAULTY:
         first = found["faults"][0]
-        text = f"the second reader finds {found['faulty']} faults in the corrected program: {first['text']}"
+        text = f"the second reader finds {found['faulty']} faults in the corrected program; the first: {first['text']}"
         console.tell(Message("NCF033", text, Place(shown(target.path), first["line"])))
     return found

@@ -44,7 +44,9 @@ def show_changes(job: FixJob, program: ProgramFile, motions: bool, as_json: bool
     refused = report.refusals
     console.tell_some([*report.warnings, *refused])
     if refused and not job.options.allow_refused:
-        console.say(f"{visible(name)}: {console.counted(len(refused), 'motion')} refused, so nothing would be written")
+        console.say(
+            f"{visible(name)}: {console.counted(len(refused), 'motion')} refused, so `ncfix fix` would write nothing"
+        )
         return ExitCode.REFUSED, {**entry, "changed": False, "motions": [], "refused": refused}
     if not as_json:
         _put(changes, found, motions, text, name)

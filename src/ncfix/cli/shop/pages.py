@@ -52,7 +52,9 @@ class Pages:
         read     other inputs
         """
         if plot is not None and many:
-            raise UsageError.of("NCF001", "--plot is a picture of one program", hint="--report has pages of many")
+            raise UsageError.of(
+                "NCF001", "--plot makes a picture of one program only", hint="--report makes pages of several programs"
+            )
         found = cls(page, plot, many, force)
         inputs = identities([*(target.source for target in targets), *(path for path in read if path)])
         outputs = {folded_name(target.path) for target in targets}
@@ -60,7 +62,7 @@ class Pages:
             if path is not None:
                 if folded_name(path) in outputs:
                     raise UsageError.of(
-                        "NCF006", "is the output of a program, too", Place(path), "give it another name"
+                        "NCF006", "is also the output of a program", Place(path), "give the page another name"
                     )
                 check_target(path, inputs, replace=True)
                 check(path)
@@ -129,7 +131,7 @@ def _check_page(path: str) -> None:
     from ncfix.reports.pages import library
 
     if path == STREAM or _suffix(path) not in ("html", "htm"):
-        raise UsageError.of("NCF018", "the page of programs is an .html file", Place(path), "--report FILE.html")
+        raise UsageError.of("NCF018", "the page of a batch must be an .html file", Place(path), "--report FILE.html")
     library()
 
 

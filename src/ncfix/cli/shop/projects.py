@@ -133,9 +133,9 @@ class ProjectCommand(click.Command):
 
                 close = get_close_matches(key, others, 1)
                 hint = f"did you mean {close[0]}?" if close else "ncfix fix --help shows the options"
-                raise _wrong(project, key, value, "there is no such option", hint)
+                raise _wrong(project, key, value, "`ncfix fix` has no such option", hint)
             if key in COMMAND_LINE_ONLY:
-                text = "is said on the command line, and not in a project file"
+                text = "can be given on the command line only, not in a project file"
                 raise _wrong(project, key, value, text, f"--{key.replace('_', '-')}")
             if key in self.not_of_it:
                 continue
@@ -154,7 +154,7 @@ def tell_of(*projects: Project) -> None:
     """Print which project files are used, unless the run is quiet."""
     if not click.get_current_context().meta.get(QUIET):
         for project in projects:
-            console.say(f"{visible(project.path)}: options that are not given here come from this file")
+            console.say(f"{visible(project.path)}: options that the command line does not give come from this file")
 
 
 def _options(params: Iterable[click.Parameter]) -> dict[str, click.Option]:
@@ -179,12 +179,12 @@ def _taken(option: click.Option, key: str, value: Any, project: Project) -> Any:
         return option.flag_value is not False if value else None
     several = value if isinstance(value, list) else [value]
     if len(several) != 1 and not option.multiple:
-        raise _wrong(project, key, value, f"{len(several)} values, where one is needed")
+        raise _wrong(project, key, value, f"{len(several)} values, where one is expected")
     if odd := [each for each in several if isinstance(each, bool) or not isinstance(each, (str, int, float))]:
         raise _wrong(project, key, value, f"{odd[0]!r} is neither a text nor a number")
     texts = [str(each) for each in several]
     if any(not each or "\0" in each for each in texts):
-        raise _wrong(project, key, value, "the text is empty, or has a NUL character")
+        raise _wrong(project, key, value, "the text is empty or contains a NUL character")
     if isinstance(option.type, (PathName, click.Path)):
         texts = [project.from_here(each) for each in texts]
         if option.name == "output" and texts[0][-1] != os.sep:
@@ -230,22 +230,22 @@ def project_options(command: Callable[..., Any]) -> Callable[..., Any]:
         type=PATH,
         metavar="FILE",
         expose_value=False,
-        help="The project file, instead of the ncfix.toml in the folder of the program or above.",
+        help="Project file; default: ncfix.toml in the folder of the program or above.",
     )
-    none = click.option("--no-project", is_flag=True, expose_value=False, help="Use no project file.")
+    none = click.option("--no-project", is_flag=True, expose_value=False, help="Ignore project files.")
     return named(none(command))
 
 
 @click.command()
 @click.argument("folder", type=FOLDER, default=".", metavar="[FOLDER]")
-@click.option("-m", "--machine", type=PATH, metavar="FILE", help="The machine file.")
-@click.option("--setup", type=PATH, metavar="FILE", help="The setup file; empty for none.")
-@click.option("-o", "--output", type=PATH, metavar="DIR", help="Where corrected programs go.")
+@click.option("-m", "--machine", type=PATH, metavar="FILE", help="Machine file.")
+@click.option("--setup", type=PATH, metavar="FILE", help="Setup file; empty for none.")
+@click.option("-o", "--output", type=PATH, metavar="DIR", help="Folder for corrected programs.")
 @force_option
 def init(folder: str, machine: str | None, setup: str | None, output: str | None, force: bool) -> None:
     """Write a project file ncfix.toml into FOLDER, so that `ncfix fix PROGRAM` needs no options there.
 
-    It asks for what no option gives. Paths are counted from FOLDER.
+    It asks for the values that the options do not give. Paths in the file are relative to FOLDER.
     """
     from ncfix import files
     from ncfix.machine import load
@@ -257,10 +257,10 @@ def init(folder: str, machine: str | None, setup: str | None, output: str | None
     values = {
         "machine": _asked("machine", machine, "machine file", _only(folder, ("topology",)) or None),
         "setup": _asked("setup", setup, "setup file, empty for none", _only(folder, ("[work_offsets]", "[tools]"))),
-        "output": _asked("output", output, "folder of corrected programs", "corrected"),
+        "output": _asked("output", output, "folder for corrected programs", "corrected"),
     }
     if values["output"] in ("", "-"):
-        raise UsageError.of("NCF003", "corrected programs go to a folder", hint="-o DIR")
+        raise UsageError.of("NCF003", "corrected programs need a folder", hint="-o DIR")
     load(os.path.join(folder, values["machine"]))
     if values["setup"]:
         from ncfix.control.setup_file import load as load_setup
@@ -268,7 +268,7 @@ def init(folder: str, machine: str | None, setup: str | None, output: str | None
         load_setup(os.path.join(folder, values["setup"]))
     text = written({key: value for key, value in values.items() if value}, resume=True)
     files.write_whole(path, text.encode(), force)
-    console.say(f"{visible(path)}: ncfix fix PROGRAM corrects a program in this folder or below")
+    console.say(f"{visible(path)}: written; ncfix fix PROGRAM now corrects a program in this folder or below")
 
 
 def _asked(option: str, given: str | None, what: str, default: str | None) -> str:
@@ -278,7 +278,9 @@ def _asked(option: str, given: str | None, what: str, default: str | None) -> st
     if sys.stdin is None or not sys.stdin.isatty():
         if default is not None:
             return default
-        raise UsageError.of("NCF001", f"the {what} is not given, and there is no terminal to ask", hint=f"--{option}")
+        raise UsageError.of(
+            "NCF001", f"the {what} is not given, and there is no terminal to ask for it", hint=f"--{option}"
+        )
     return str(click.prompt(what, default=default, err=True))
 
 

@@ -70,7 +70,7 @@ def brief(entry: Mapping[str, Any]) -> str:
     found = entry.get("errors") or entry["refused"]
     line = f":{found[0]['line']}" if found[0].get("line") else ""
     rest = f" (and {len(more)} more)" if more else ""
-    stale = "; the output that is there is of an earlier state: do not run it" if entry.get("stale") else ""
+    stale = "; the existing output is out of date: do not run it" if entry.get("stale") else ""
     before = ", as before" if entry.get("resumed") else ""
     return f"{visible(entry['path'])}{line}: {code}: {text.splitlines()[0]}{rest}{stale}{before}"
 
@@ -175,4 +175,4 @@ class OutcomeReporter:
             if self.seen[code] <= console.MAX_MESSAGES_PER_CODE:
                 console.say(brief(entry))
             elif self.seen[code] == console.MAX_MESSAGES_PER_CODE + 1:
-                console.say(f"more programs with {code} are only counted; -v and --json name all")
+                console.say(f"further programs with {code} are only counted; -v and --json list all")

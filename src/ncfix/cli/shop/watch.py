@@ -86,9 +86,9 @@ class StatusPage:
             return
         check_target(self.path, identities(inputs), replace=True)
         if os.path.splitext(self.path)[1].lower() not in (".html", ".htm"):
-            raise UsageError.of("NCF018", "a status page is an .html file", Place(self.path), "--status FILE.html")
+            raise UsageError.of("NCF018", "a status page must be an .html file", Place(self.path), "--status FILE.html")
         if os.path.lexists(self.path) and not files.read_bytes(self.path).startswith(HEAD.encode()):
-            text = "exists already, and is no status page of ncfix watch"
+            text = "exists already and is not a status page of ncfix watch"
             raise UsageError.of("NCF004", text, Place(self.path), "give the page another name")
 
     def add(self, entry: Mapping[str, Any]) -> None:
@@ -147,20 +147,22 @@ def _clock(at: float) -> str:
     type=Positive(),
     default=2.0,
     show_default=True,
-    help="A program is complete when it has not changed for so many seconds.",
+    help="Time without a change after which a program counts as complete, s.",
 )
 @click.option(
     "--poll-s",
     type=Positive(),
     metavar="S",
-    help="Look at IN every S seconds: for network shares, which report no changes.",
+    help="Interval at which IN is looked at, s; for network shares, which report no changes.",
 )
-@click.option("--status", type=PATH, metavar="FILE.html", help="Keep a page of what became of the programs.")
-@click.option("--once", is_flag=True, help="End when all that is in IN now is done.")
-@click.option("--project", type=PATH, metavar="FILE", expose_value=False, help="The project file.")
-@click.option("--no-project", is_flag=True, expose_value=False, help="Use no project file.")
-@click.option("-q", "--quiet", is_flag=True, help="Say only which programs were not written, and why.")
-@click.option("-v", "--verbose", is_flag=True, help="Say everything about each program.")
+@click.option(
+    "--status", type=PATH, metavar="FILE.html", help="Write a status page of the programs, and keep it up to date."
+)
+@click.option("--once", is_flag=True, help="End when all programs that are in IN now are done.")
+@click.option("--project", type=PATH, metavar="FILE", expose_value=False, help="Project file.")
+@click.option("--no-project", is_flag=True, expose_value=False, help="Ignore project files.")
+@click.option("-q", "--quiet", is_flag=True, help="Print only the programs that were not written, and why.")
+@click.option("-v", "--verbose", is_flag=True, help="Print everything about each program.")
 def watch(
     folder: str,
     output: str,
@@ -174,16 +176,16 @@ def watch(
     machine_path: str,
     **options: Any,
 ) -> int:
-    """Correct programs that come into the folder IN, each when it is complete, into the folder OUT, until Ctrl-C.
+    """Correct the programs that arrive in the folder IN, each when it is complete, into the folder OUT, until Ctrl-C.
 
-    What has been done before and has not changed is not done again, as with `ncfix fix --resume`.
+    Programs that are done and have not changed are skipped, as with `ncfix fix --resume`.
     """
     if not os.path.isdir(folder):
-        raise UsageError.of("NCF014", "is not a folder", Place(folder), "make it, or name another one")
+        raise UsageError.of("NCF014", "is not a folder", Place(folder), "make this folder, or name another one")
     if output in ("", STREAM):
-        raise UsageError.of("NCF003", "corrected programs go to a folder", hint="name the folder OUT")
+        raise UsageError.of("NCF003", "corrected programs need a folder", hint="name the folder OUT")
     if os.path.isdir(output) and os.path.samefile(folder, output):
-        raise UsageError.of("NCF005", "is the folder of the programs, too", Place(output), "name another folder OUT")
+        raise UsageError.of("NCF005", "is also the folder of the programs", Place(output), "name another folder OUT")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     inputs = [path for path in (machine_path, *given.files) if path]
     verbosity = Verbosity.of(quiet, verbose)
