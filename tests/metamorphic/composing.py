@@ -308,7 +308,7 @@ class Composition(NamedTuple):
 
 class Corrected(NamedTuple):
     """A program that was corrected: its motions (n, k) before and behind, which of them (n,) are passed in the end, why
-    some were refused, and how many pass by which rule."""
+    some were refused, or are when it is read again, and how many pass by which rule."""
 
     text: str
     before: Vector
@@ -339,15 +339,17 @@ def compose(author: type[Author], dialect: str, machines: Sequence[Machine], see
     return Composition(own, dialect, machine, setup, replace(OPTIONS, strategy=strategy, flatten=flat), items)
 
 
-def motions(source: bytes, made: Composition) -> tuple[Vector, NDArray[np.bool_]]:
-    """What there is to say of the motions of a program: where they end, the circle, the tool, how fast; which pass."""
+def motions(source: bytes, made: Composition) -> tuple[Vector, NDArray[np.bool_], list[str]]:
+    """What there is to say of the motions of a program: where they end, the circle, the tool, how fast; which pass; why
+    some are refused."""
     names, rotary = made.machine.axis_names, rotary_names(made.machine)
     program = read(source, "part", made.dialect)
     moves = trace(program, made.setup, names, rotary, kinematics=kinematics_of(made.machine)).moves
     rows = np.flatnonzero(moves.kind != MotionKind.DWELL)
     columns = (moves.kind, *(moves.sweep * moves.normal.T), *moves.centre.T, moves.tool_length, speeds(moves))
     said = np.column_stack([ends(moves, made.machine), *(column[rows] for column in columns)])
-    return said, moves.rule[rows] == Rule.PASS
+    refused = sorted({moves.reasons[n] for n in moves.reason[rows[moves.rule[rows] == Rule.REFUSE]]})
+    return said, moves.rule[rows] == Rule.PASS, refused
 
 
 def speeds(moves: Moves) -> Vector:
@@ -366,8 +368,8 @@ def corrected(text: str, made: Composition) -> Corrected:
     """Correct a program, and follow it before and behind."""
     fixed = fix_flat if made.options.flatten else fix_program
     done = fixed(read(text.encode(), "part", made.dialect), made.machine, made.setup, made.options)
-    (before, _), (after, passes) = (motions(each, made) for each in (text.encode(), done.text))
-    refused = [f"{each.code} {each.reason}" for each in done.report.refused]
+    (before, _, _), (after, passes, again) = (motions(each, made) for each in (text.encode(), done.text))
+    refused = [f"{each.code} {each.reason}" for each in done.report.refused] or again
     return Corrected(done.text.decode(), before, after, passes, refused, done.report.passed_by_rule)
 
 

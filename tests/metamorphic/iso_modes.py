@@ -278,7 +278,7 @@ class IsoModes(Author):
         self.unsaid = set(self.letters)
 
     def may_swivel(self) -> bool:
-        if self.dialect not in ("fanuc", "mitsubishi") or not self.plain_frame() or self.second:
+        if self.dialect not in MACRO or not self.plain_frame() or self.second:
             return False
         self.absolute()
         self.upright()
@@ -287,6 +287,17 @@ class IsoModes(Author):
         return True
 
     def swivel(self, plane: Frame, target: Vector) -> None:
+        if self.dialect == "haas":
+            plane = Frame(self.posture(target))
+            self.travel(target, rapid=True)
+            self.alone("G254")
+        else:
+            self.swivel_plane(plane, target)
+        self.plane, self.tcp, self.rotation = True, True, plane
+        self.compose()
+
+    def swivel_plane(self, plane: Frame, target: Vector) -> None:
+        """G68.2, and the turn to it."""
         angles = Rotation.from_matrix(plane.turn).as_euler("ZXZ", degrees=True)
         words = zip("XYZIJK", [*(plane.shift / self.unit), *angles], strict=True)
         self.alone("G68.2 " + " ".join(f"{letter}{number(value, 9)}" for letter, value in words))
@@ -297,8 +308,6 @@ class IsoModes(Author):
             self.code = "0"
         else:
             self.alone("G53.1", moves=True)
-        self.plane, self.tcp, self.rotation = True, True, plane
-        self.compose()
 
     def unswivel(self) -> None:
         self.absolute()
@@ -309,16 +318,16 @@ class IsoModes(Author):
 
     def tilted(self, chance: random.Random) -> None:
         """A tilted plane, on or off."""
-        if self.dialect not in ("fanuc", "mitsubishi") or self.steps or not self.rotary:
+        if self.steps or not self.rotary:
             return
         if self.plane:
             self.plane = self.tcp = False
             self.rotation = Frame()
-            self.mode("G69")
+            self.mode("G255" if self.dialect == "haas" else "G69")
             if self.led:
                 self.alone(f"G43 H{self.tool}")
             self.led = False
-        elif self.tcp or not self.plain_frame() or self.second:
+        elif self.dialect not in ("fanuc", "mitsubishi") or self.tcp or not self.plain_frame() or self.second:
             return
         else:
             if not self.length:

@@ -37,6 +37,7 @@ from ncfix.control.coordinates import (
     about,
     angles_in_words,
     dot,
+    mask_of,
     product,
 )
 from ncfix.control.expressions import Fault
@@ -367,6 +368,7 @@ def dynamic_offset(control: MacroControl, block: Block, code: int) -> None:
         return
     control.dynamic = True
     begin(control, machine.axes, Block(block.index, {}, frozenset(), 0))
+    control.places.lose(mask_of(control.turning))  # a rotary word would turn the tables under the offset
 
 
 def turns_tables(control: MacroControl, block: Block) -> bool:
