@@ -184,3 +184,29 @@ def test_a_word_that_acts_at_the_end_of_a_split_block() -> None:
     assert fixed.count(b"\n") > text.count(b"\n") + 1  # besides the stamp
     assert not prove(text, fixed, machine("three"), given, "iso").faults
     assert prove(text, fixed.replace(b" G09", b""), machine("three"), given, "iso").faults
+
+
+CONTROLS = {
+    "G28 of Haas ends the length": (
+        "haas",
+        "G43 H1 Z90.\nG91 G28 Z0.\nG90 G0 X10. Y10.\nZ95.\nG1 Z92. F300.\nX30.\n",
+        True,
+    ),
+    "G54 P2 is no G54": ("fanuc", "G54 P2\nG0 X10. Y10.\nG1 X30. F300.\nG54\nX20. Y20.\n", False),
+    "G54 beside a dwell": ("fanuc", "G54 G4 P200\nG0 X10. Y10.\nG1 X30. F300.\n", True),
+    "G30 P3 is not the second point": ("fanuc", "G91 G30 P3 Z0.\nG90 G0 Z60.\nG1 X30. F300.\n", True),
+    "G5 P10001 moves axes": ("fanuc", "G5 P10001\nG1 X30. F300.\nG0 X10. Y10. Z60.\nG1 X20. F300.\n", False),
+    "G5 P10000 moves none": ("fanuc", "G5 P10000\nG1 X30. F300.\nG0 X10. Y10. Z60.\nG1 X20. F300.\nG5 P0\n", True),
+}
+
+
+@pytest.mark.parametrize(("dialect", "text", "all_of_it"), CONTROLS.values(), ids=CONTROLS)
+def test_what_controls_of_one_family_do_differently_is_no_alarm(dialect: str, text: str, all_of_it: bool) -> None:
+    places = {"G54": {"X": 5.0, "Y": 6.0, "Z": 7.0}, "G54.1P2": {"X": -20.0, "Y": 3.0, "Z": 9.0}}
+    setup = replace(SETUP, work_offsets=places, references={"G28": {"Z": 150.0}, "G30": {"Z": 120.0}})
+    source = f"%\nO1\nG21 G17 G40 G49 G80 G90 G94 G54\nT1 M6\nG0 X0. Y0. Z80.\n{text}M30\n%\n".encode()
+    known, language = machine("three"), get(dialect)
+    fixed = fix_program(read(source, "part", language), known, setup, FixOptions(allow_refused=True)).text
+    proof = prove(source, fixed, known, given_of(setup, language), language.variant_of or dialect)
+    assert not proof.faults
+    assert (proof.proved_motions >= proof.motions - 2) is all_of_it, dict(proof.reasons)

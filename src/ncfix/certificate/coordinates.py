@@ -46,6 +46,8 @@ class Given:
     """Numbers without a decimal point count least increments: such programs are not followed."""
     decimal_inches: bool = False
     """A least increment of 0.001 mm becomes 0.0001 inch in blocks in inches."""
+    reference_ends_length: bool = False
+    """G28 takes the tool length offset away, as on Haas."""
 
 
 class Loss(NamedTuple):

@@ -32,6 +32,8 @@ WORDS_QUIET = re.compile(
 )
 """Words of SINUMERIK that move nothing and change no coordinates."""
 DECLARES = frozenset(("DEF", "EXTERN"))
+STORED_CYCLES = 10001
+"""Least P of G5 that moves axes, by data in the control; smaller ones say how far ahead it looks."""
 OF_THE_CONTROL = 2000
 """Least number of a variable that may be an offset or a position of the control."""
 SINGLE = frozenset("GNFSTDMHPLEQO")
@@ -120,7 +122,8 @@ class WordAddressFollower(AxisFollower):
         own = {word.name for word in line.codes}
         if self.family is not Family.WORDS or line.odd:
             return False
-        return (codes == [51] and "Q" in own) or (codes in ([50], [1870]) and not line.path)
+        looks_ahead = codes == [1870] or (codes == [50] and (line.code("P") or 0.0) < STORED_CYCLES)
+        return (codes == [51] and "Q" in own) or (looks_ahead and not line.path)
 
     def _changed_coordinates(self, line: TextLine, codes: Sequence[int]) -> bool:
         """Apply a line that only shifts or turns the coordinates, by plain numbers; False if it does not."""
@@ -286,6 +289,8 @@ class WordAddressFollower(AxisFollower):
                     fixed = True
                 case 280 | 300 if self.family is Family.WORDS:
                     fixed = True
+                case 540 if self._is_extended(line, codes):
+                    self.lose_by("G54 with P")
                 case 430 | 434 if self.family is Family.WORDS:
                     length_set = True
                     self._length_offset(line, code == 434)
@@ -297,6 +302,11 @@ class WordAddressFollower(AxisFollower):
         if self.tcp and not length_set and any(code in (540, 550, 560, 570) for code in codes):
             self.unsay("XYZ")
         return apart, fixed or any(word.name == "SUPA" for word in line.codes)
+
+    def _is_extended(self, line: TextLine, codes: Sequence[int]) -> bool:
+        """Whether G54 is an additional work offset, G54.1 Pn: its P belongs to no other code."""
+        calls = any(word.name == "M" for word in line.codes)
+        return self.family is Family.WORDS and line.code("P") is not None and not calls and 40 not in codes
 
     def _took_mode(self, code: int) -> bool:
         """Apply a code of motion, plane, unit, distance, feed or cutter compensation; False for any other code."""
@@ -432,7 +442,8 @@ class WordAddressFollower(AxisFollower):
         """A motion in machine coordinates, or to a reference point."""
         named = {axis: word for axis, word in words.items() if axis in self.at}
         if 280 in codes or 300 in codes:
-            point = self.given.references.get("G28" if 280 in codes else "G30", {})
+            second = line.code("P") in (None, 2.0)
+            point = self.given.references.get("G28" if 280 in codes else "G30" if second else "", {})
             end = dict(self.at)
             for axis in named or self.axes:
                 end[axis] = point.get(axis, NAN)
@@ -442,6 +453,9 @@ class WordAddressFollower(AxisFollower):
             end |= dict.fromkeys("XYZ", NAN)
         step = self.step(row, Kind.FIXED, end, line)
         self.unsay(tuple(named) or self.axes)
+        if 280 in codes and self.given.reference_ends_length:
+            self.lead(False)
+            self.new_length(0.0)
         return step
 
     def _hole(self, row: int, line: TextLine, words: Mapping[str, TextWord]) -> AxisStep:

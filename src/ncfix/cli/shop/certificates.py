@@ -41,6 +41,7 @@ def given_of(setup: Setup, dialect: Dialect) -> Given:
         inputs=setup.inputs,
         pointless=setup.no_point.startswith("IS"),
         decimal_inches=dialect.decimal_inches,
+        reference_ends_length=dialect.semantics == "haas",
     )
 
 
