@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
 from conftest import FULL
@@ -95,6 +96,18 @@ def test_the_radius_decides_and_without_it_that_is_said() -> None:
     assert left[None] < 0.02
     assert left[0.001] < 0.02
     assert left[3.0] > 0.3  # 1.2 um along X, of which a line that leads little up and down sees little
+
+
+@pytest.mark.parametrize("setting", ["G10 L12 P1 R8.", "#13001=8.", "G10 L13 P1 R0.02", "#12001=0.02", ""])
+def test_a_radius_that_the_program_sets_is_not_that_of_the_setup(setting: str) -> None:
+    """Its number may be a diameter, and wear may be added to it."""
+    scale = Effect("EXX", (0.1,), Polynomial((1,)), 0.0, 250.0)
+    machine = perfect(TOPOLOGIES["three-axis"]).replace(effects=(scale,), least_increment=(1e-5, 1e-5))
+    setup = Setup(assume_zero=True, tools={1: Tool(LENGTH, 3.0)}, no_point="calculator")
+    program = read(f"{setting}\n{ACUTE}".encode(), "part", "fanuc")
+    report = fix_program(program, machine, setup, FixOptions(tolerance_um=50.0)).report
+    changes = "L12" in setting or "13001" in setting
+    assert ("NCF455" in {each.code for each in report.warnings}) == changes
 
 
 def test_a_corner_that_would_become_worse_is_refused_and_a_larger_tolerance_takes_it() -> None:

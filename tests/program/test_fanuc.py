@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +73,10 @@ def test_blocks_of_the_family_can_be_read(text: str) -> None:
         ('CGTECH_MACRO "A" "B"', "NCF103"),
         ("G15 H1", "NCF103"),
         ("CALL OO88", "NCF103"),
+        ("G62 X1 Y0", "NCF103"),
+        ("G62 X1. Y0.", ""),
+        ("G62 G1 X1 Y1", ""),
+        ("G62 X0 Y0", ""),
         ("N5 G50S1600 (LIMIT)", "NCF103"),
         ("G73 P10 Q20 U0.4 W0.1", "NCF103"),
     ],
@@ -320,6 +325,22 @@ def test_codes(text: str, expected: list[list[float]]) -> None:
 def test_what_is_not_followed_is_refused(text: str, reason: str) -> None:
     found = follow(text, dialect="fanuc", no_point="calculator", assume_zero=True)
     assert all(reason in why for why in reasons(found)[-1:])
+
+
+def test_tables_get_no_words_while_g254_of_haas_counts_from_where_they_stand(root: Path) -> None:
+    """`full` corrects them where the program turns them; a word under G254 would turn them again."""
+    machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
+    turns = "G0 A-30. C90.\nG254\nG0 X10. Y10.\nG43 Z60. H1\nG1 Z30. F500.\nX20.\nG0 Z60.\nG255\n"
+    text = f"G21 G90 G94 G17 G54\nT1 M6\n{turns}G0 A0. C0.\nG0 X0. Y0. Z90.\nM30\n"
+    setup = Setup(work_offsets={"G54": {"Z": 60.0}}, initial=dict.fromkeys("XYAC", 0.0) | {"Z": 290.0})
+    setup = replace(setup, tools={1: Tool(80.0)})
+    fixed = fix_program(read(text.encode(), "part", "haas"), machine, setup, FixOptions(strategy="full"))
+    under = fixed.text.decode().partition("G254")[2].partition("G255")[0]
+    assert "A-30." not in fixed.text.decode().split()
+    assert not {"A", "C"} & set(under)
+    again = follow_on(read(fixed.text, "part", "haas"), machine, setup).trace.moves
+    assert not fixed.report.refused
+    assert (again.rule != Rule.REFUSE).all()
 
 
 def test_g53_in_increments_is_passed_and_loses_its_axes() -> None:

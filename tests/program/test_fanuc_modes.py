@@ -171,6 +171,25 @@ def test_m96_of_haas_jumps_by_an_input(dialect: str, refused: bool) -> None:
     assert ["M96" in reason for reason in found] == [False, refused, refused]
 
 
+def test_where_a_program_of_haas_goes_may_be_for_a_pallet_or_the_operator() -> None:
+    pallet = reasons(follow("G21G0X1.\nM46Q1P5\nX2.\nN5X3.", setup=SETUP, dialect="haas"))
+    assert ["M46" in reason for reason in pallet] == [False, True, True]
+    asked = "G21G0X1.\n#501=0.\nM109P501(GO ON Y/N)\nIF[#501EQ78.]GOTO9\nX2.\nN9X3."
+    found = reasons(follow(asked, setup=SETUP, dialect="haas"))
+    assert ["decided at run time" in reason for reason in found] == [False, True, True]
+
+
+def test_m199_of_haas_ends_a_program() -> None:
+    text = "G21G0X1.\nM98P9\nM199\nO9\nX2.\nM99"
+    assert ends(follow(text, setup=SETUP, dialect="haas")) == [[1, 0, 0], [2, 0, 0]]
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "mitsubishi"])
+def test_m97_without_a_block_ends_interrupts(dialect: str) -> None:
+    found = follow("G21G0X1.\nM96P9000\nX2.\nM97\nX3.", setup=SETUP, dialect=dialect)
+    assert reasons(found) == [""] * 3
+
+
 @pytest.mark.parametrize("angle", [20.0, 25.0, 33.3, 71.7])
 @pytest.mark.parametrize("code", ["G28", "G30"])
 def test_increments_of_zero_to_a_reference_point_lead_by_no_way(code: str, angle: float) -> None:

@@ -284,11 +284,31 @@ def test_g52_in_g91_may_be_added_to_the_shift_in_force(dialect: str) -> None:
 @pytest.mark.parametrize("dialect", ["iso", "fanuc"])
 @pytest.mark.parametrize(
     ("text", "known"),
-    [("G5 P10000", True), ("G5 P3", True), ("G5 P10000 X0 Y0", False), ("G25", True), ("G25 X0", False)],
+    [
+        *(("G5 P10000", True), ("G5 P3", True), ("G5", True), ("G5 P10000 X0 Y0", False), ("G25", True)),
+        *(("G25 X0", False), ("G11", True), ("G11 X0 Y0", False), ("G23", True), ("G23 X0 Y0 I5 J5", False)),
+        *(("G103", True), ("G103 P1", True), ("G103 X0 Z0 R5.", False)),
+    ],
 )
 def test_codes_that_some_controls_know_without_words_of_axes(dialect: str, text: str, known: bool) -> None:
     found = reasons(follow(f"G21 G0 X1.\n{text}\nX2.", dialect=dialect, no_point="calculator"))
     assert (found[-1] == "") is known
+
+
+@pytest.mark.parametrize("dialect", ["iso", "fanuc", "haas", "mitsubishi"])
+@pytest.mark.parametrize("kind", ["P10001", "P10999 L2", "P10000", "P11000", "P[#500]"])
+def test_high_speed_cycles_whose_data_are_in_variables_move_axes(dialect: str, kind: str) -> None:
+    setup: dict[str, Any] = {"dialect": dialect, "no_point": "calculator"}
+    found = reasons(follow(f"G21 G0 X1. Y1. Z1.\nG5 {kind}\nX2. Y2. Z2.\nX3.", **setup))
+    if kind in ("P10000", "P11000"):
+        assert found == [""] * 3
+    elif kind == "P[#500]":
+        assert found[0] == ""
+        assert all("P of G5" in each for each in found[1:])
+    else:
+        assert [each[:32] for each in found] == ["", "high-speed cycle machining (G5 P", "", ""]
+        cut = reasons(follow(f"G21 G0 X1. Y1. Z1.\nG5 {kind}\nG1 X2. F9.", **setup))
+        assert "the control makes up" in cut[-1]
 
 
 def test_the_first_work_offset_is_in_force_at_the_start() -> None:

@@ -58,8 +58,9 @@ UNFOLLOWED = {
 }
 CHANGED = "the length of the tool is changed while it is in force (G10 L10, #11001), which acts sooner or later"
 TOOL_LIFE = 3
-HARMLESS = frozenset({TOOL_LIFE, 12, 13})
-"""Tool life, and tool radii, which only the control's cutter compensation uses."""
+RADIUS = 12
+HARMLESS = frozenset({TOOL_LIFE, RADIUS, 13})
+"""Tool life, and tool radii and their wear, which only the control's cutter compensation uses."""
 DATA_WORDS = frozenset("PLTHDQ")
 """Words of the blocks between G10 L3 and G11, which select no tool and no length."""
 
@@ -118,6 +119,8 @@ def set_data(control: MacroControl, block: Block, code: int) -> None:
         set_extended(control, block)
     elif kind in LENGTHS:
         set_length(control, block)
+    elif kind == RADIUS:
+        control.tools.resized.add(whole(block.get("P"), "P of G10"))
     elif kind not in HARMLESS:
         what = UNFOLLOWED.get(kind, f"data of the control (G10 L{kind})")
         control.refuse_rest(f"the program sets {what}, which ncfix does not follow")

@@ -312,7 +312,7 @@ class MacroInterpreter(RS274Interpreter):
             return self.returned(block)
         if codes.call in SUBPROGRAM:
             self.subprogram(block)
-        elif codes.call == LOCAL_SUBPROGRAM:
+        elif codes.call == LOCAL_SUBPROGRAM and "P" in block.values:  # without P it ends interrupts (M96)
             self.flow.enter_local(whole(block.get("P"), "P of M97"), whole(block.get("L", 1.0), "L of M97"))
         else:
             self.call_modal()

@@ -12,10 +12,12 @@ level and the depth from R, in the block that names them.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import LETTERS
-from ncfix.control.expressions import Fault
-from ncfix.control.operations import Refuse
+from ncfix.control.expressions import Fault, Unknown
+from ncfix.control.operations import BlockValues, Destination, Like, Operation, Refuse
+from ncfix.values import frozen
 from ncfix_fanuc.macro import coordinates, data, lengths, patterns, references, tilt
 from ncfix_fanuc.macro.variables import compiled, is_lasting, is_system
 from ncfix_iso.rs274 import groups
@@ -24,12 +26,15 @@ from ncfix_iso.rs274.cycles import BAD_CYCLE, drill, place_hole, repeats
 from ncfix_iso.rs274.groups import ISO_G, Rules, grouped
 from ncfix_iso.rs274.systems import check_system, preset_system, unfollowed
 
+if TYPE_CHECKING:
+    from ncfix.control.control import ProgramControl
+
 MACRO = "macro call"
 
 FOREIGN = frozenset(
     {
         *(171, 181, 191, 281, 301, 591, 592, 593, 901, 911, 922, 923),
-        *(*groups.TURNING_CYCLES, *groups.PROBES, *groups.SPLINES, 331, 760, 431, 432, 411, 421, 890),
+        *(*groups.TURNING_CYCLES, *groups.PROBES, 331, 760, 431, 432, 411, 421, 890),
     }
 )
 """Codes of LinuxCNC that have no meaning, or another one, on these controls."""
@@ -160,7 +165,24 @@ HAAS_FEATURE = (2680, 2690)
 HAAS_MIRRORS, HAAS_CYLINDER = (1000, coordinates.HAAS_MIRROR), 1070
 """Mirror images about the zero point, G101 and G100, and G107, with which an axis goes round a cylinder."""
 
-HAAS_JUMP, BY_INPUT = 960, "which blocks are executed after M96 is for an input of the machine"
+HAAS_JUMPS = {
+    960: "which blocks are executed after M96 is for an input of the machine",
+    460: "which blocks are executed after M46 is for the pallet in the machine",
+}
+HAAS_END, HAAS_QUESTION = 1990, 1090
+"""M199, which ends a program, or returns from it while pallets are changed, and M109, which asks the operator."""
+
+
+@frozen
+class Ask(Operation):
+    """M109 Pn: variable n gets the code of the key that the operator presses."""
+
+    def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
+        """See `Operation`."""
+        if "P" in block.values and isinstance(control, RS274Control):
+            control.parameters.assign(round(block.values["P"]), Unknown())
+
+
 HAAS = replace(
     FANUC,
     g_groups=FANUC_G
@@ -186,10 +208,13 @@ HAAS = replace(
     radius_first=False,
     adds_rotations=True,
     offset_group=12,
+    aliases={("M", HAAS_END): Like("M30")},
 )
-HAAS = groups.with_m_code(HAAS, HAAS_JUMP, (Refuse(BY_INPUT),))
+for _code, _reason in HAAS_JUMPS.items():
+    HAAS = groups.with_m_code(HAAS, _code, (Refuse(_reason),))
+HAAS = groups.with_m_code(HAAS, HAAS_QUESTION, (Ask(),))
 """Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), mills texts and pockets on its own, pecks
-by I J K, and jumps by M96 P Q while an input is off."""
+by I J K, and jumps by M96 P Q while an input is off, by M46 Q P for a pallet."""
 
 MITSUBISHI_MADE = (*CIRCULAR_POCKETS, *MITSUBISHI_PATTERNS)
 """Circular pockets and rows of holes: G12, G13, G34 to G37.1."""

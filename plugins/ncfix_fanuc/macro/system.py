@@ -24,8 +24,9 @@ Getter = Callable[[], Value]
 OFFSETS = range(5221, 5327)
 """Work offsets G54 (5221) to G59 (5321), twenty numbers each."""
 
-LENGTHS = range(11001, 12000)
-"""Tool lengths (geometry). Whether #2001 and #10001 are lengths or wear depends on the kind of offset memory."""
+LENGTHS, RADII = range(11001, 12000), range(13001, 14000)
+"""Tool lengths and radii (geometry). Whether #2001 and #10001 are lengths or wear depends on the kind of offset
+memory."""
 
 SPATIAL = range(3)
 ALARM, ALARM_RAISED = 3000, "NCF216"
@@ -104,5 +105,7 @@ def was_set(control: MacroControl, number: int, value: Value) -> None:
             activate(control, control.modal.system)
     elif number in LENGTHS:
         keep_length(control, number - LENGTHS.start + 1, scaled(control.modal.unit, value))
+    elif number in RADII:
+        control.tools.resized.add(number - RADII.start + 1)
     elif not is_harmless(number):
         control.refuse_rest(f"the program sets #{number}, which ncfix does not follow")

@@ -37,6 +37,7 @@ SPINDLE_MODE = "spindle speed mode"
 DIAMETER = "lathe diameter mode"
 ROTATION = "coordinate rotation"
 UNFOLLOWED = "scaling, mirroring, polar coordinates, tilted planes"
+HIGH_SPEED = "high-speed machining"
 
 STOP = "stop"
 INPUT_OUTPUT = "input and output"
@@ -91,9 +92,10 @@ ISO_G = {code: group for code, group in LINUXCNC_G.items() if code not in (70, 8
     SYSTEM=(541,),
     ROTATION=(680, 690),
     UNFOLLOWED=(121, 131, 1120, 1130, 150, 160, 500, 501, 510, 511, 682, 683, 684),
+    HIGH_SPEED=(50,),
 )
 
-ISO_HARMLESS_G = frozenset(code * 10 for code in (5, 8, 9, 11, 23, 25, 26, 62, 63, 103, 187, 332)) | {51, 53}
+ISO_HARMLESS_G = frozenset(code * 10 for code in (8, 9, 11, 23, 25, 26, 62, 63, 103, 187, 332)) | {51, 53}
 """Codes of ISO controls that move nothing and change no coordinates: exact stop, look-ahead, smoothing, limits.
 
 G5.3 P selects the surface smoothness on Hurco, G332 R the balance of speed and accuracy on DMG MORI.

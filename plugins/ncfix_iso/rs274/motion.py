@@ -11,6 +11,7 @@ import math
 from ncfix.control.coordinates import INDEX, LETTERS, N_LETTERS, Vector, X, Y, mask_of, rotated
 from ncfix.control.expressions import Fault, Unknown, nominal
 from ncfix.control.moves import FeedMode, Motion, MotionEnd, MotionKind, Pass, Passing, UnknownAxes
+from ncfix.control.operations import make_up
 from ncfix.control.tcp import led_in_machine
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import REFERENCES, check_system, is_given, store, stored, words_of
@@ -384,6 +385,24 @@ def end_spline(control: RS274Control, block: Block, code: int) -> None:
     if control.modal.motion != 52:
         raise Fault(BAD_MOTION, "G5.3 ends a spline, and none was begun with G5.2")
     control.modal.motion = -1
+
+
+STORED_CYCLES = range(10001, 11000)
+"""P of G5 that runs one of 999 cycles stored in variables, each of which moves axes."""
+STORED = "high-speed cycle machining (G5 P{:.0f}): its path is in variables of the control"
+STORED_AT_RUN_TIME = "which kind of high-speed machining (P of G5) begins is known only at run time"
+
+
+def high_speed(control: RS274Control, block: Block, code: int) -> None:
+    """G5 of ISO controls: P0 to P10000 set how far ahead the control looks, and move nothing.
+
+    Source: Fanuc 30i operator's manual, "High-speed cycle machining".
+    """
+    kind = block.get("P")
+    if "P" in block.unknown:
+        control.refuse_rest(STORED_AT_RUN_TIME)
+    elif kind in STORED_CYCLES:
+        make_up(control, block, STORED.format(kind), control.turning)
 
 
 def turning_cycle(control: RS274Control, block: Block, code: int) -> None:

@@ -25,6 +25,7 @@ from ncfix_iso.rs274.motion import (
     feed,
     feed_mode,
     go_to_reference,
+    high_speed,
     one_way,
     probe,
     refused,
@@ -91,6 +92,7 @@ G_STEPS: tuple[tuple[str, Step], ...] = (
     (groups.CONTROL, path_mode),
     (groups.UNFOLLOWED, unfollowed),
     (groups.ROTATION, rotate_system),
+    (groups.HIGH_SPEED, high_speed),
 )
 """Steps of G codes other than motions, by group."""
 

@@ -44,9 +44,10 @@ DWELL_WORDS = "P"
 NO_WORDS = frozenset("GMNO")
 """Addresses whose words are not passed as values to the steps of a block."""
 
-WITHOUT_WORDS = frozenset({50, 250, 260, 281, 301})
+WITHOUT_WORDS = frozenset({50, 110, 230, 250, 260, 281, 301, 1030})
 """Codes with different meanings without and with axis words: G5 P10000 and splines, G25 and G26 of spindles and of
-working areas, G28.1 and G30.1 that save the position and that approach one."""
+working areas, G28.1 and G30.1 that save the position and that approach one; G11 and G23, which end data and the
+check of strokes, and are motions in other languages; G103, the look-ahead of Haas, an arc in XZ of Brother."""
 SMOOTHING = 51
 """G5.1 Q: axis words, `G5.1 Q2 X0 Y0 Z0`, name the axes concerned, and move nothing."""
 

@@ -124,6 +124,7 @@ class Tools:
     cutter    radius for contour offsets, mm, if the program gives it; else NaN
     lengths   tool lengths set by the program (G10 L1), mm
     measured  tools whose length the program sets from values known only at run time
+    resized   registers (D) whose radius the program sets; what the control makes of the number is not known
     unsure    the tool in the spindle is known only at run time; `doubtful`: the selected one
     """
 
@@ -137,6 +138,7 @@ class Tools:
     cutter: float = math.nan
     lengths: dict[int, float] = field(default_factory=dict)
     measured: set[int] = field(default_factory=set)
+    resized: set[int] = field(default_factory=set)
 
     def select(self, number: int, *, unsure: bool = False) -> None:
         """Select the tool for the next change; `unsure`: the number is only nominal."""
@@ -471,5 +473,5 @@ class ControlState(ABC):
         if not math.isnan(self.tools.cutter):
             return self.tools.cutter
         number = self.tool_length()[0] if self.tools.register is None else self.tools.register
-        known = self.knowledge.known_tool_radius(number)
+        known = None if number in self.tools.resized else self.knowledge.known_tool_radius(number)
         return math.nan if known is None else known

@@ -30,7 +30,11 @@ FOREIGN: tuple[tuple[str, bytes], ...] = (
         rb"(?im)^[ \t]*(?:N\d+[ \t]*)?(?:DEF[ \t]+(?:REAL|INT|BOOL|CHAR|STRING|AXIS|FRAME)\b|PROC[ \t]+\w"
         rb"|A?(?:TRANS|ROT|MIRROR|SCALE)\b|MSG[ \t]*\(|(?:CYCLE|POCKET|SLOT|HOLES)\d+[ \t]*\(|R\d+[ \t]*=)",
     ),
-    ("Okuma OSP code", rb"(?im)^[^(;\n]*(?<![A-Z])(?:G1[56][ \t]*H[ \t]*\d|VC\d+[ \t]*=|CALL[ \t]+O[A-Z\d])"),
+    (
+        "Okuma OSP code",
+        rb"(?im)^[^(;\n]*(?<![A-Z])(?:G1[56][ \t]*H[ \t]*\d|VC\d+[ \t]*=|CALL[ \t]+O[A-Z\d]"
+        rb"|G62(?=[^(;\n]*[XYZ][ \t]*1(?![\d.]))(?:[ \t]*[XYZ][ \t]*[01](?![\d.]))+[ \t]*\r?$)",
+    ),
     (
         "Okuma OSP code",
         rb"(?im)\A(?=(?s:.*?)G[ \t]*56(?![\d.]))(?!(?s:.*)^[^(;\n]*(?<![A-Z])G[ \t]*4[34](?!\d))(?s:.*?)"
@@ -56,8 +60,8 @@ FOREIGN: tuple[tuple[str, bytes], ...] = (
 )
 """Languages of other families, for `Dialect.foreign`: their common name, and a pattern that identifies them.
 
-On Okuma, G54 to G59 are tool lengths, and G15 H selects work offsets. MAHO shifts the zero point by G93, and draws a
-window by G98 and G99. On NUM, G52 is a motion in machine coordinates.
+On Okuma, G54 to G59 are tool lengths, G15 H selects work offsets, and G62 mirrors the axes that it gives a 1. MAHO
+shifts the zero point by G93, and draws a window by G98 and G99. On NUM, G52 is a motion in machine coordinates.
 """
 
 LATHE = "lathe code (X a diameter, U and W increments)"
