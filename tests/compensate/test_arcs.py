@@ -180,7 +180,7 @@ def test_under_cutter_compensation_an_arc_stays_one_or_is_kept_and_named() -> No
     rng = np.random.default_rng(9)
     machine = random_machine(rng, TOPOLOGIES["three-axis"], ("polynomial",))
     moves = motions(machine, (0, 0, 0), [(0, 0, 0), Arc((20, 0, 0), (0, 0, 1), 1e-5), Arc((20, 0, 0), (0, 0, 1), 1.0)])
-    moves = changed(moves, compensated=np.array([False, True, True]))
+    moves = changed(moves, whole=np.array([False, True, True]))
     result = planned(machine, moves, ROUNDING)
     assert len(result.pieces) == 3
     assert result.pieces.unchanged.tolist() == [False, True, False]
@@ -196,7 +196,7 @@ def test_a_full_circle_whose_ends_come_apart_does_not_get_another_centre(rise: f
     machine = perfect("w F X Y Z t").replace(effects=(Effect("EXZ", (0.05,), Polynomial((1,)), 0.0, 250.0),))
     circle = Arc((20, 20, 0), (0, 0, 1), -2 * np.pi, rise)
     moves = motions(machine, (27, 27, 0), [(27, 27, 0), circle])
-    whole = planned(machine, changed(moves, compensated=np.array([False, True])), ROUNDING / 10).pieces
+    whole = planned(machine, changed(moves, whole=np.array([False, True])), ROUNDING / 10).pieces
     assert whole.unchanged.tolist() == [False, unchanged]
     assert np.linalg.norm((whole.centre[1] - moves.centre[1])[:2]) < 0.02
     assert worst(machine, moves, planned(machine, moves, ROUNDING / 10)) < TOLERANCE

@@ -160,7 +160,7 @@ def test_deviations_in_command_space_are_those_of_the_machine() -> None:
 def test_nothing_is_split_under_cutter_compensation() -> None:
     machine = bow(0.05)
     moves = motions(machine, (-250, 0, 0), [(-250, 0, 0), (250, 0, 0)])
-    moves = changed(moves, compensated=np.ones(2, dtype=bool))
+    moves = changed(moves, whole=np.ones(2, dtype=bool))
     result = plan(machine, moves, get_strategy("position"), TOLERANCE)
     assert len(result.pieces) == 2
     assert [(finding.code, finding.moves.tolist()) for finding in result.findings] == [("NCF413", [1])]

@@ -382,7 +382,7 @@ def test_rows_of_holes_that_the_control_makes_up_are_refused(dialect: str, block
 )
 def test_a_motion_behind_which_something_is_called_is_not_split(text: str, dialect: str, held: list[bool]) -> None:
     found = follow(f"G21G90\n{text}", dialect=dialect, no_point="calculator", assume_zero=True)
-    assert found.moves.compensated.tolist() == held
+    assert found.moves.whole.tolist() == held
 
 
 def test_additional_work_offsets_of_haas() -> None:

@@ -56,7 +56,7 @@ def test_the_axes_of_a_corner_are_those_of_its_two_motions() -> None:
 def test_motions_at_a_corner_are_not_split() -> None:
     lines = "\n".join(f"X{n}." for n in range(1, 31))
     found = follow(f"F50.\nG1Y1.,R2.\n{lines}", dialect="fanuc")
-    assert found.moves.compensated.tolist() == [True, True] + [False] * 29
+    assert found.moves.whole.tolist() == [True, True] + [False] * 29
     assert not any(reasons(found))
 
 

@@ -26,7 +26,7 @@ def machine(root: Path) -> Machine:
 def whole(text: str, dialect: str, machine: Machine) -> tuple[list[bool], list[str]]:
     """Which motions must not be split, those of the head left out, and the codes of what is said."""
     trace = follow(read((HEAD + text + "M30\n").encode(), "part.nc", dialect), machine, SETUP).trace
-    return trace.moves.compensated[1:].tolist(), [message.code for message in trace.messages]
+    return trace.moves.whole[1:].tolist(), [message.code for message in trace.messages]
 
 
 @pytest.mark.parametrize("dialect", ["fanuc", "haas", "mitsubishi", "iso"])

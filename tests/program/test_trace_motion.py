@@ -127,7 +127,7 @@ def test_after_rigid_tapping_the_tool_is_where_it_was() -> None:
 
 def test_cutter_compensation_is_marked_and_the_programmed_contour_followed() -> None:
     moves = follow("F100 G41 D2\nG1 X10\nY10\nG40 X0\nX5").moves
-    assert moves.compensated.tolist() == [True, True, True, False]
+    assert moves.whole.tolist() == [True, True, True, False]
     assert moves.end[:, :2].tolist() == [[10, 0], [10, 10], [0, 10], [5, 10]]
     assert (moves.rule == Rule.CORRECT).all()
 

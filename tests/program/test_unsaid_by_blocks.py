@@ -121,7 +121,7 @@ def test_a_turn_in_a_plane_is_not_split_where_axes_that_turn_evenly_would_leave_
     body = TURNS[dialect][0].format(code)
     more = "".join(f"X{40 + k / 8} Y{k / 8}\n" for k in range(many))
     moves = on_five_axes(f"G90\n{body}{more}A20 C20\nM30\n", dialect)
-    assert moves.compensated.nonzero()[0].tolist() == ([1, 3 + many] if in_plane else [])
+    assert moves.whole.nonzero()[0].tolist() == ([1, 3 + many] if in_plane else [])
 
 
 def test_another_tip_control_than_is_known_is_refused() -> None:

@@ -366,7 +366,7 @@ class Sinumerik(ProgramControl):
             return index
         style = self.builder.styles[index]
         return self.builder.style(
-            style._replace(rotary_as_programmed=self.held, compensated=style.compensated or self.whole)
+            style._replace(rotary_as_programmed=self.held, whole=style.whole or self.whole)
         )
 
     def _passes_zero(self, words: BlockWordValues, target: Vector) -> bool:

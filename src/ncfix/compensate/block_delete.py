@@ -300,7 +300,7 @@ def _restricted(moves: Moves, whole: set[int], spelled: Mapping[int, Mask], rest
     resting  blocks in which an axis without a word gets none
     """
     if whole:
-        moves = replace(moves, compensated=moves.compensated | np.isin(moves.block, list(whole)))
+        moves = replace(moves, whole=moves.whole | np.isin(moves.block, list(whole)))
     if resting:
         rests = np.isin(moves.block, list(resting))[:, None] & ~moves.programmed
         moves = replace(moves, resting=moves.resting | rests)

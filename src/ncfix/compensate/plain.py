@@ -357,7 +357,7 @@ class Planner:
         worst = looked_at(intent, real, rows, checked, limit)
         if np.isinf(worst).any() or (real.arc[rows] & (worst > limit)).any():
             return rows, None, ()
-        whole = (worst > limit) & moves.compensated[rows]
+        whole = (worst > limit) & moves.whole[rows]
         findings = (not_split(rows[whole], worst[whole]),) if whole.any() else ()
         over = (worst > limit) & ~whole
         rows, deviation = rows[over], worst[over]

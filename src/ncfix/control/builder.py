@@ -31,7 +31,7 @@ class MotionStyle(NamedTuple):
     incremental: bool
     arc_absolute: bool
     tcp: bool
-    compensated: bool
+    whole: bool
     tool: int
     tool_length: float
     feed_mode: int
@@ -353,7 +353,7 @@ class MotionBuilder:
             back = self.winding.back(turning, plain, start - offset, end - offset) & free & ~rows
             rows |= back
             self.brought_back = _first(block, back & cuts, self.brought_back)
-        styles["compensated"] = styles["compensated"] | rows
+        styles["whole"] = styles["whole"] | rows
         angles = np.full((len(self.columns), 2), np.nan)
         angles[turning] = extremes(plain, end - offset)
         return angles

@@ -153,7 +153,7 @@ class Moves:
     incremental  (n,) the block's words are increments (G91)
     arc_absolute (n,) the centre of an arc is given in absolute coordinates (G90.1)
     tcp          (n,) X Y Z are tool-tip coordinates in the workpiece
-    compensated  (n,) cutter radius compensation (G41/G42) is active, or the motion must not be split otherwise
+    whole        (n,) the motion must not be split: under cutter radius compensation (G41, G42), or for another reason
     tool         (n,) number of the tool of `tool_length`: of the active length offset, else of the tool in the spindle
     tool_length  (n,) mm, spindle reference to tip; NaN where not known
     feed         (n,) mm/min, 1/min or mm/rev according to `feed_mode`, always in mm; NaN where none is set
@@ -205,7 +205,7 @@ class Moves:
     incremental: Mask
     arc_absolute: Mask
     tcp: Mask
-    compensated: Mask
+    whole: Mask
     tool: NDArray[np.int32]
     tool_length: Array
     feed: Array

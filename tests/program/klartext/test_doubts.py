@@ -75,12 +75,12 @@ def test_a_remark_between_a_line_and_its_corner_changes_nothing() -> None:
 
 def test_a_turn_in_a_plane_is_not_split() -> None:
     body = "FUNCTION TCPM F TCP AXIS POS PATHCTRL {}\nL X+1 C+30 F100\nL X+5\nFUNCTION RESET TCPM"
-    assert follow(body.format("VECTOR"), "XYZC").moves.compensated.tolist() == [True, False]
-    assert follow(body.format("AXIS"), "XYZC").moves.compensated.tolist() == [False, False]
+    assert follow(body.format("VECTOR"), "XYZC").moves.whole.tolist() == [True, False]
+    assert follow(body.format("AXIS"), "XYZC").moves.whole.tolist() == [False, False]
 
 
 def test_a_motion_whose_time_is_given_is_not_split() -> None:
-    held = follow("L X+1 F100\nL X+5 FT2\nL X+9 FU0.1\nL X+1 FMAXT5").moves.compensated.tolist()
+    held = follow("L X+1 F100\nL X+5 FT2\nL X+9 FU0.1\nL X+1 FMAXT5").moves.whole.tolist()
     assert held == [False, True, False, True]
 
 

@@ -363,14 +363,14 @@ def test_codes_that_end_something_act_at_the_end_of_their_block() -> None:
     moves = follow("L C+350 F100\nM126\nL C+10 M127\nL C+350", "XYZC").moves
     turns = np.degrees(moves.end[:, 3] - moves.start[:, 3])
     assert turns[1] == pytest.approx(20.0)
-    assert moves.compensated.tolist() == [False, True, False]
+    assert moves.whole.tolist() == [False, True, False]
     rules = follow("M144\nL X+1 F100 M145\nL X+2 FMAX").moves.rule.tolist()
     assert rules == [Rule.REFUSE, Rule.CORRECT]
 
 
 def test_corners_are_left_to_the_control_and_not_split() -> None:
     moves = follow("L X+10 F100\nRND R2\nL Y+10\nL X+0").moves
-    assert moves.compensated.tolist() == [True, True, False]
+    assert moves.whole.tolist() == [True, True, False]
     assert moves.end[:, :2].tolist() == [[10, 0], [10, 10], [0, 10]]
 
 
@@ -379,7 +379,7 @@ def test_approach_and_departure() -> None:
     moves = follow(body).moves
     assert moves.end.tolist() == [[10, 5, 0], [20, 5, 0], [30, 5, 0], [30, 5, 5]]
     assert moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.PASS, Rule.CORRECT]
-    assert moves.compensated.tolist() == [True, False, False, False]
+    assert moves.whole.tolist() == [True, False, False, False]
 
 
 def test_beside_the_contour_a_departure_ends_where_the_radius_of_the_tool_leads() -> None:

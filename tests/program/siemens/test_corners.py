@@ -74,5 +74,5 @@ def test_both_lanes_agree(machine: Machine) -> None:
     """Behind a corner, many blocks at once and one by one."""
     blocks = [f"X{n} Y{n % 7} Z{n % 3}\n" for n in range(40)]
     many, single = (corrected("X90 RND=5\n" + other.join(blocks), machine)[0] for other in ("", "M8\n"))
-    assert np.array_equal(many.compensated, single.compensated)
-    assert many.compensated.tolist() == [False, True, True] + [False] * 39
+    assert np.array_equal(many.whole, single.whole)
+    assert many.whole.tolist() == [False, True, True] + [False] * 39

@@ -75,4 +75,4 @@ def test_a_program_is_followed_as_it_cuts(name: str) -> None:
 )
 def test_what_acts_by_blocks_needs_them_whole(body: str, whole: list[bool]) -> None:
     """A further block would begin the action, the call or the stroke anew, or end what acts in one block only."""
-    assert on_the_cradle(body).moves.compensated.tolist()[1:] == whole
+    assert on_the_cradle(body).moves.whole.tolist()[1:] == whole

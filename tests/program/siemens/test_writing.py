@@ -87,7 +87,7 @@ def test_a_turn_past_zero_is_not_split(turn: str) -> None:
 def test_a_motion_with_a_feed_of_its_own_is_not_split() -> None:
     source = b"G54 G0 X10 Y0 Z100 A0 C0\nG1 X12 F2000\nX20 FB=100\nX30\nM30\n"
     moves = traced(read(source, "part.mpf", "siemens"), load(CRADLE), Setup(assume_zero=True)).moves
-    assert moves.compensated.tolist() == [False, False, True, False]
+    assert moves.whole.tolist() == [False, False, True, False]
 
 
 def on_the_cradle(body: str) -> tuple[str, Moves]:

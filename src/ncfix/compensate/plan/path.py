@@ -210,7 +210,7 @@ def _plan(intent: Intent, strategy: Strategy, required: Requirements, unchanged:
         ends = with_rotary_as_it_stands(intent, ends, unchanged, before)
     approaches = corrected_approaches(intent, ends.wanted, unchanged) if strategy.follows_path else None
     real, broken = _real(intent, ends.wanted, unchanged, required, before, approaches)
-    bound = intent.moves.compensated | crooked(intent) if strategy.follows_path else np.ones(len(unchanged), dtype=bool)
+    bound = intent.moves.whole | crooked(intent) if strategy.follows_path else np.ones(len(unchanged), dtype=bool)
 
     def without(finding: Finding) -> Plan:
         """The plan in which the motions of a finding stay unchanged, too, with that finding."""
@@ -373,7 +373,7 @@ def _remarks(
     """Remarks: shortfalls of the plan for which no motion stays unchanged."""
     remarks = []
     budget = required.budget
-    over = np.flatnonzero((deviation > budget.path) & (intent.moves.compensated | crooked(intent)))
+    over = np.flatnonzero((deviation > budget.path) & (intent.moves.whole | crooked(intent)))
     if over.size:
         remarks.append(not_split(over, deviation[over]))
     unknown = _unknown_radius(intent, unchanged)
