@@ -78,7 +78,7 @@ class WholeFile:
 def read_bytes(path: str, most: int = inputs.MAX_BYTES) -> bytes:
     """The content of a file of at most `most` bytes; raises `SourceError` NCF002."""
     try:
-        return inputs.taken(path, most)
+        return inputs.content_of(path, most)
     except OSError as error:
         raise unreadable(path, error) from error
 

@@ -77,7 +77,7 @@ def check_size(count: int, most: int = MAX_BYTES) -> None:
         raise OSError(errno.EFBIG, f"it has more than {most >> 20} MB")
 
 
-def taken(path: str, most: int = MAX_BYTES) -> bytes:
+def content_of(path: str, most: int = MAX_BYTES) -> bytes:
     """The content of a file. Raises OSError with the words of the system or plain ones."""
     with opened(path) as handle:
         return content(handle, most)

@@ -88,7 +88,7 @@ def registry(kind: str, builtin: Mapping[str, Any] | None = None) -> dict[str, A
     for plugin in load_plugins().loaded:
         for name, thing in plugin.things.get(kind, {}).items():
             if name in things:
-                report(taken(plugin.name, kind, name, "ncfix itself"))
+                report(name_taken(plugin.name, kind, name, "ncfix itself"))
             elif lacks := lacking(kind, thing):
                 leave(plugin.name, plugin.distribution, kind, name, lacks)
             else:
@@ -197,7 +197,7 @@ def load_one(point: EntryPoint, earlier: Iterable[Plugin]) -> Plugin:
         for kind, named in things.items():
             for name in named:
                 if name in plugin.things.get(kind, ()):
-                    raise PluginError((taken(point.name, kind, name, f"plugin {plugin.name!r}"),))
+                    raise PluginError((name_taken(point.name, kind, name, f"plugin {plugin.name!r}"),))
     return Plugin(point.name, point.value, *described(point.dist), things)
 
 
@@ -275,7 +275,7 @@ class Registrar:
             text = f"plugin {self.plugin!r} left out: it registers {thing!r} of {self.kind} without a name"
             raise PluginError((Message("NCF505", text, hint="register(thing, name=...)"),))
         if key in self.things:
-            raise PluginError((taken(self.plugin, self.kind, key, "itself"),))
+            raise PluginError((name_taken(self.plugin, self.kind, key, "itself"),))
         self.things[key] = thing
 
 
@@ -292,7 +292,7 @@ def left_out(code: str, point: EntryPoint, why: str, hint: str) -> PluginError:
     return PluginError((Message(code, f"plugin {point.name!r}{source} left out: it {why}", hint=hint),))
 
 
-def taken(plugin: str, kind: str, name: str, owner: str) -> Message:
+def name_taken(plugin: str, kind: str, name: str, owner: str) -> Message:
     """The message that a name is already registered."""
     text = f"plugin {plugin!r} left out: it registers {name!r} of {kind}, which {owner} has registered"
     return Message("NCF503", text, hint="NCFIX_DISABLE_PLUGINS leaves one of them out")

@@ -121,7 +121,7 @@ def test_what_has_no_end_is_read_so_far(tmp_path: Path) -> None:
     with huge.open("wb") as file:
         file.truncate(1 << 40)
     with pytest.raises(OSError, match="more than 1024 MB"):
-        inputs.taken(str(huge))
+        inputs.content_of(str(huge))
 
 
 def test_a_program_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -143,7 +143,7 @@ def test_a_writer_that_comes_late_is_waited_for(tmp_path: Path) -> None:
 
     writer = threading.Thread(target=write)
     writer.start()
-    assert inputs.taken(str(pipe)) == b"text"
+    assert inputs.content_of(str(pipe)) == b"text"
     writer.join()
 
 

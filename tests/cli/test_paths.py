@@ -181,7 +181,7 @@ def test_verify_names_what_it_could_not_look_at(ncfix: Any, examples: Path, tmp_
     program.write_bytes(b"BEGIN PGM A MM\nL X+0 Y+0 Z+5 FMAX\nL X+10 F100\nL X+Q7\nL X+30 Y+5 F100\nEND PGM A MM\n")
     call = ["verify", program, program, "-m", examples / "machines/three_axis.toml", "--assume-zero"]
     result = ncfix(*call, "--tolerance-um", "100")
-    assert "not examined: lines 4 5 of the original" in result.out.decode()
+    assert "not examined: lines 4 to 5 of the original" in result.out.decode()
     assert ncfix(*call, "--json").json()["lines_not_looked_at"] == [4, 5]
 
 

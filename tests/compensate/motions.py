@@ -76,7 +76,7 @@ def motions(
         incremental=none,
         arc_absolute=none,
         tcp=whole if tcp else none,
-        compensated=none,
+        whole=none,
         tool=np.zeros(n, dtype=np.int32),
         tool_length=np.full(n, tool_length),
         feed=np.full(n, 1000.0),

@@ -23,7 +23,7 @@ from ncfix.compensate.account import (
     NoFigureReason,
     Reason,
     either,
-    joined,
+    in_sequence,
     merged,
     not_looked_at,
     rule_of,
@@ -157,7 +157,7 @@ def test_stretches_of_two_parts_are_put_together_where_they_meet() -> None:
 def test_what_is_left_in_parts_adds_up_and_of_ways_the_most_counts() -> None:
     one = {"Y": left("Y", 2, 1, ((3, 5),), 0.001), "X": left("X", 1, 1, ((9, 9),), 0.004)}
     two = {"X": left("X", 5, 3, ((10, 14), (16, 16)), 0.002), "Z": left("Z", 1, 0, ((2, 2),), 0.1)}
-    found = joined(one, two)
+    found = in_sequence(one, two)
     assert list(found) == ["Z", "Y", "X"]
     assert found["X"] == left("X", 6, 4, ((9, 14), (16, 16)), 0.004)
     found = either([one, two])

@@ -14,7 +14,7 @@ from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.estimate import Problem
 from ncfix.measure.least_squares import solve
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.plan import joined, plan, skeleton
+from ncfix.measure.plan import appended, plan, skeleton
 from ncfix.measure.selection import select
 
 LOCATIONS = "EC0Y,EA0Z,EB0Z,EXX,EYY,EZZ,EYX,EZX,EXY,EZY,EXZ,EYZ"
@@ -80,7 +80,7 @@ def test_new_poses_complete_what_was_measured():
     places = candidates(known, "tcp", 200, ROOM, seed=77)
     more = plan(known, "tcp", 10, ROOM, LOCATIONS, existing=flat).plan
     assert np.isinf(worst(known, flat, places, LOCATIONS))
-    assert np.isfinite(worst(known, joined(flat, more), places, LOCATIONS))
+    assert np.isfinite(worst(known, appended(flat, more), places, LOCATIONS))
 
 
 def test_poses_keep_the_tip_within_reach():

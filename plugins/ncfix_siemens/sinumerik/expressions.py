@@ -294,7 +294,7 @@ class VariableExpressions(Expressions):
         """
         if operator == "<<":
             first, second = self.compiled(left), self.compiled(right)
-            return lambda scope: joined(first(scope), second(scope))
+            return lambda scope: concatenated(first(scope), second(scope))
         if operator not in COMPARISONS:
             return super().operator(operator, left, right, address)
         if any(is_loose(side) for side in (left, right)):
@@ -326,7 +326,7 @@ def shown(value: Value) -> Value:
     return value if isinstance(value, Unknown | str) else f"{value:.15g}"
 
 
-def joined(left: Value, right: Value) -> Value:
+def concatenated(left: Value, right: Value) -> Value:
     """Two values joined as text."""
     first, second = shown(left), shown(right)
     return Unknown() if isinstance(first, Unknown) or isinstance(second, Unknown) else f"{first}{second}"

@@ -365,9 +365,7 @@ class Sinumerik(ProgramControl):
         if not self.held and not self.whole:
             return index
         style = self.builder.styles[index]
-        return self.builder.style(
-            style._replace(rotary_as_programmed=self.held, whole=style.whole or self.whole)
-        )
+        return self.builder.style(style._replace(rotary_as_programmed=self.held, whole=style.whole or self.whole))
 
     def _passes_zero(self, words: BlockWordValues, target: Vector) -> bool:
         """Whether DC, ACP, ACN or IC leads an axis past a full turn, so that the motion must not be split."""

@@ -18,7 +18,7 @@ from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.projects import ProjectCommand, project_options
 from ncfix.cli.streams import Source, source_of
 from ncfix.cli.targets import STREAM, shown
-from ncfix.diagnostics import ExitCode, Message
+from ncfix.diagnostics import ExitCode, Message, lines_named
 from ncfix.values import frozen
 
 if TYPE_CHECKING:
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 Said = tuple[Sequence[Message], ...]
 """Messages from following the original and the corrected program."""
-MAX_LINES_LISTED = 5
-"""Largest number of lines that are listed by number."""
 
 
 @frozen
@@ -175,7 +173,7 @@ def verdict(found: Compared, tolerance_um: float) -> Iterator[str]:
     if found.no_figure:
         yield console.no_figure(found.no_figure)
     if found.unseen:
-        yield f"not examined: {lines_said(found.unseen)} of the original; their position is not known"
+        yield f"not examined: {_named(found.unseen)} of the original; their position is not known"
     limits = f"{tolerance_um:g} um, plus {found.rounding_um:.2f} um for the control's digits"
     if found.within and found.after["max"] is None:
         yield "no motion cuts: there is nothing to compare"
@@ -184,9 +182,9 @@ def verdict(found: Compared, tolerance_um: float) -> Iterator[str]:
         yield f"within {limits}" if found.within else unsure(limits)
         return
     of = "" if found.beyond else " of the original"
-    yield f"NOT within {limits}: {lines_said(found.beyond or found.not_reached)}{of}"
+    yield f"NOT within {limits}: {_named(found.beyond or found.not_reached)}{of}"
     for axis, lines in found.left.items():
-        where = f"{lines_said(lines)} of the original"
+        where = f"{_named(lines)} of the original"
         yield f"{axis} cannot be corrected in {where}: the program has not given the position of {axis} there"
 
 
@@ -195,8 +193,10 @@ def unsure(limits: str) -> str:
     return f"NOT known to be within {limits}: all examined motions are, but some could not be examined"
 
 
-def lines_said(lines: Sequence[int]) -> str:
-    """Lines, the first few by number: `lines 4 5 6 and 12 more`."""
-    few = " ".join(map(str, lines[:MAX_LINES_LISTED]))
-    more = f" and {len(lines) - MAX_LINES_LISTED} more" if len(lines) > MAX_LINES_LISTED else ""
-    return f"line{'s' if len(lines) > 1 else ''} {few}{more}"
+def _named(lines: Sequence[int]) -> str:
+    """Lines in ascending order, in words."""
+    import numpy as np
+
+    from ncfix.arrays import in_stretches
+
+    return lines_named(in_stretches(np.array(lines)))

@@ -191,7 +191,7 @@ def merged(before: tuple[tuple[int, int], ...], later: tuple[tuple[int, int], ..
     return (*before[:-1], (before[-1][0], later[0][1]), *later[1:])
 
 
-def joined(before: Mapping[str, LeftAxis], later: Mapping[str, LeftAxis]) -> dict[str, LeftAxis]:
+def in_sequence(before: Mapping[str, LeftAxis], later: Mapping[str, LeftAxis]) -> dict[str, LeftAxis]:
     """The axes that were left in two consecutive parts of a program."""
     both = {axis: before[axis].with_later(later[axis]) for axis in before.keys() & later.keys()}
     return in_order({**before, **later, **both})

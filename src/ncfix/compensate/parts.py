@@ -23,7 +23,7 @@ from ncfix.compensate.solve import Round, SelfCheckError, WrittenPlan, differenc
 from ncfix.compensate.workers import PartCheckpoint, Read, WorkShare
 from ncfix.control.moves import MotionKind, Moves, Rule, Trace
 from ncfix.control.setup import Setup
-from ncfix.control.trace import Follower, NotInPartsError, PartReader, joined, joined_moves, last_of, stretch
+from ncfix.control.trace import Follower, NotInPartsError, PartReader, joined_moves, joined_programs, last_of, stretch
 from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
@@ -111,7 +111,7 @@ class Parts:
                 if self.follower.to_the_last and self.rest.strip():
                     raise NotInPartsError("text that may belong to the program comes after its end")
             self.found += 1
-            yield Part(joined(programs), moves, last)
+            yield Part(joined_programs(programs), moves, last)
             pending = []
             if last:
                 return
@@ -231,7 +231,7 @@ class ContinuedPart:
         """The part with the motion before it as its first motion."""
         if self.head is None:
             return self.part
-        program = joined([self.head.program, self.part.program])
+        program = joined_programs([self.head.program, self.part.program])
         moves = joined_moves([self.head.moves, self.part.moves], [1, len(self.part.program)])
         return Part(program, moves, self.part.last)
 

@@ -38,7 +38,7 @@ from ncfix.compensate.plan.strategies import Strategy, get_strategy
 from ncfix.compensate.plan.written import on_digits, rounding
 from ncfix.compensate.solve import Planning, WrittenPlan, closure_of
 from ncfix.control.moves import FeedMode, MotionKind, Moves, Rule
-from ncfix.control.trace import taken
+from ncfix.control.trace import motions_at
 from ncfix.control.turns import turns_alone
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
@@ -166,7 +166,7 @@ def by_the_long_way(
     if MIN_MOTIONS_PER_ODD * len(odd) > len(moves) or odd[0] == 0 or odd[-1] + 2 >= len(moves):
         return None
     near = distinct(np.concatenate([odd - 1, odd, odd + 1]))
-    few = taken(moves, near)
+    few = motions_at(moves, near)
     accepted = Planning.of(few, machine, dialect, options).accepted()
     if accepted.reasons or accepted.plan.findings or (accepted.unchanged != (few.kind == MotionKind.DWELL)).any():
         return None

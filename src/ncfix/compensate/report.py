@@ -12,11 +12,19 @@ import numpy as np
 
 from ncfix.arrays import Mask, lengths
 from ncfix.compensate import FixOptions
-from ncfix.compensate.account import Account, LeftAxis, either, joined, left_where_they_stand, said_of, without_figure
+from ncfix.compensate.account import (
+    Account,
+    LeftAxis,
+    either,
+    in_sequence,
+    left_where_they_stand,
+    said_of,
+    without_figure,
+)
 from ncfix.compensate.block_delete import JointPlan, worst_findings
 from ncfix.compensate.following import LOOKED, Numbers, numbers_of, numbers_together
 from ncfix.compensate.plan.figure_tally import PathError
-from ncfix.compensate.plan.findings import Finding, Notes
+from ncfix.compensate.plan.findings import Finding, FindingKind, Notes
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.compensate.plan.written import rounding_along
@@ -184,10 +192,10 @@ SUMS = ("blocks", "moves", "compensated", "passed", "unseen", "samples", "insert
 def as_written(solution: WrittenPlan) -> Iterator[Finding]:
     """Findings about the text: turns that are written with inverse time, and split motions under exact stop."""
     if timed := solution.emission.timed:
-        yield Finding.of("NCF456", np.array(timed, dtype=np.intp), TIMED, HAS_G93)
+        yield Finding.of("NCF456", np.array(timed, dtype=np.intp), TIMED, HAS_G93, FindingKind.ONCE)
     stops, pieces = solution.moves.exact_stop, solution.plan.pieces
     if (rows := np.flatnonzero(stops & (np.bincount(pieces.move, minlength=len(stops)) > 1))).size:
-        yield Finding.of("NCF283", rows, STOPS, MARKS)
+        yield Finding.of("NCF283", rows, STOPS, MARKS, FindingKind.ONCE)
 
 
 @mutable
@@ -227,7 +235,7 @@ class Tally:
         every, steps = joint.plans, increments(machine)
         lacking = [each.lacking(steps, own) for each in every]
         left = [left_where_they_stand(program, each.moves, lack) for each, lack in zip(every, lacking, strict=True)]
-        self.left = joined(self.left, either(left))
+        self.left = in_sequence(self.left, either(left))
         account = Account.together([Account.of(each.moves, each.unchanged, each.reasons) for each in every])
         unseen = Counter[str]()
         for k, (solution, lack, found) in enumerate(zip(every, lacking, worst_findings(every), strict=True)):
@@ -283,7 +291,7 @@ class Tally:
         self.before.take(other.before)
         self.after.take(other.after)
         self.notes = other.notes | self.notes
-        self.left = joined(self.left, other.left)
+        self.left = in_sequence(self.left, other.left)
         self.found.take(other.found)
         if other.numbers:
             self.numbers = numbers_together(self.numbers, other.numbers, self.step)

@@ -25,7 +25,7 @@ from ncfix.compensate import FixOptions
 from ncfix.compensate.account import Lacking, Reason, at_measured_places
 from ncfix.compensate.following import kinematics_of
 from ncfix.compensate.plan.arcs import Closure, across
-from ncfix.compensate.plan.findings import COUNTED
+from ncfix.compensate.plan.findings import FindingKind
 from ncfix.compensate.plan.intent import Intent
 from ncfix.compensate.plan.limits import findings, increments_beyond_travel
 from ncfix.compensate.plan.path import PathTolerance, Plan, Requirements, plan
@@ -313,9 +313,10 @@ class Planning:
             waiting = head is not None and len(history) < len(head.unchanged)
             if not (stays.any() or (~bound[beyond]).any() or waiting):
                 return AcceptedPlan(self, planned, unchanged, reasons, reaches_back, tuple(history))
-            for finding in (*against, *planned.findings):
+            problems = (each for each in (*against, *planned.findings) if each.kind is FindingKind.PROBLEM)
+            for finding in problems:
                 for k, row in enumerate(finding.moves.tolist()):
-                    if stays[row] and finding.code != COUNTED:
+                    if stays[row]:
                         _explain(reasons, [int(moves.block[row])], finding.code, finding.sentence(k))
             _explain(reasons, moves.block[stays].tolist(), CODE_OF_RULE, "no correction was found for it")
             unchanged |= stays

@@ -120,7 +120,7 @@ def stretch(program: Program, start: int, stop: int) -> Program:
     )
 
 
-def joined(parts: list[Program]) -> Program:
+def joined_programs(parts: list[Program]) -> Program:
     """Consecutive parts joined to one program."""
     if len(parts) == 1:
         return parts[0]
@@ -163,11 +163,11 @@ def last_of(program: Program, moves: Moves) -> tuple[Program, Moves]:
     found = stretch(program, block, block + 1)
     columns = ("template", "blocks", "first_number", "number_spans", "numbers")
     alone = replace(found, **{name: getattr(found, name).copy() for name in columns})
-    motion = taken(moves, np.array([len(moves) - 1]))
+    motion = motions_at(moves, np.array([len(moves) - 1]))
     return alone, replace(motion, block=motion.block - np.int32(block))
 
 
-def taken(moves: Moves, rows: Index) -> Moves:
+def motions_at(moves: Moves, rows: Index) -> Moves:
     """The motions `rows` (k,)."""
     columns = ((each.name, getattr(moves, each.name)) for each in fields(Moves) if each.name not in TABLES)
     return replace(moves, **{name: column.take(rows, axis=0) for name, column in columns if column is not None})

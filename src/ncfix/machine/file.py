@@ -20,7 +20,7 @@ import numpy as np
 
 from ncfix.diagnostics import ConfigError, Place
 from ncfix.files import reading_hint
-from ncfix.inputs import MAX_CONFIG_BYTES, taken
+from ncfix.inputs import MAX_CONFIG_BYTES, content_of
 from ncfix.machine.axes import (
     BASE_AXES,
     DEGREE,
@@ -61,7 +61,7 @@ SMALLEST_SCALE = 1e-9
 def load(path: str | Path) -> Machine:
     """The machine of a machine file. Raises `ConfigError` with all faults found (NCF300 to NCF319)."""
     try:
-        source = taken(os.fspath(path), MAX_CONFIG_BYTES)
+        source = content_of(os.fspath(path), MAX_CONFIG_BYTES)
     except OSError as error:
         text = f"cannot read the machine file: {error.strerror}"
         raise ConfigError.of("NCF300", text, Place(str(path)), reading_hint(os.fspath(path), error)) from error

@@ -107,7 +107,7 @@ def plan(
         text = f"{count} poses of {len(poses)} that can be reached"
         raise UsageError.of("NCF636", text, hint="a smaller --count, or wider ranges")
     fixed = 0 if existing is None else len(existing)
-    every = poses if existing is None else joined(existing, poses)
+    every = poses if existing is None else appended(existing, poses)
     pool, kept = pool_of(observe(every, machine), machine, selection, room, separate, seed)
     chosen = choose(pool, count, fixed)
     order = np.random.default_rng(seed).permutation(chosen)
@@ -152,7 +152,7 @@ def _can_be_set(machine: Machine, selection: Selection, room: Room, existing: Me
         raise UsageError.of("NCF636", text, hint=f"give them a column {missing[0]}")
 
 
-def joined(first: Measurement, last: Measurement) -> Measurement:
+def appended(first: Measurement, last: Measurement) -> Measurement:
     """Two measurements of one kind joined; a missing column is filled with zeros."""
     if first.kind != last.kind:
         text = f"the poses measured already are of kind {first.kind}, not {last.kind}"

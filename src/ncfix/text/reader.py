@@ -161,7 +161,7 @@ class ProgramReading:
         parts = [self.part(first, stop) for first, stop in self.parts()]
         parts.append(self.tail())
         parts = [part for part in parts if len(part.first) > 1] or parts[:1]
-        first, spans, values = parts[0] if len(parts) == 1 else joined(parts)
+        first, spans, values = parts[0] if len(parts) == 1 else joined_columns(parts)
         return Program(
             source=self.source,
             path=self.path,
@@ -301,7 +301,7 @@ def with_exact(scan: Scan, exact: dict[int, Parsed], starts: Ints) -> PartColumn
     return PartColumns(firsts(np.bincount(owner, minlength=len(counts))), spans[order], values[order])
 
 
-def joined(parts: list[PartColumns]) -> PartColumns:
+def joined_columns(parts: list[PartColumns]) -> PartColumns:
     """The columns of consecutive parts, joined."""
     counts, spans, values = map(np.concatenate, zip(*((np.diff(each[0]), *each[1:]) for each in parts), strict=True))
     return PartColumns(firsts(counts), spans, values)

@@ -35,8 +35,7 @@ from ncfix.compensate.plan.kinematics import matters
 from ncfix.compensate.plan.written import rounding_of_arcs
 from ncfix.compensate.workers import Read
 from ncfix.control.moves import Moves
-from ncfix.control.trace import joined_moves
-from ncfix.control.trace import taken as motions_taken
+from ncfix.control.trace import joined_moves, motions_at
 from ncfix.diagnostics import DifferenceError, Message
 from ncfix.machine import Machine, State
 from ncfix.text.tree import Program
@@ -128,7 +127,7 @@ class PartEnd:
     def behind(cls, bodies: BacklashBodies, lines: Index) -> PartEnd:
         """The end of the motions of `bodies`; `lines` (n,): their lines."""
         start, moves = max(len(lines) - 2 * BESIDE, 0), bodies.intent.moves
-        last = motions_taken(moves, np.arange(start, len(lines)))
+        last = motions_at(moves, np.arange(start, len(lines)))
         return cls(last, lines[start:], bodies.came(start), bodies.before(start))
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
+from enum import Enum
 
 import numpy as np
 
@@ -21,9 +22,18 @@ MOST = 20
 """Largest number of messages of one kind that are written out; the rest are counted."""
 
 
+class FindingKind(Enum):
+    """What a finding says about its motions, and how it is reported."""
+
+    PROBLEM = "why they stay as they are; reported for each"
+    REMARK = "about motions that are corrected nevertheless; reported for each"
+    ONCE = "a remark that holds for the whole program; reported for the first motion only"
+    COUNTED = "a remark reported for the first motion, with the number of motions, their axes, and the largest figure"
+
+
 @frozen
 class Finding:
-    """One kind of problem or remark, and the motions that it concerns.
+    """A problem or remark, and the motions that it concerns.
 
     code    stable code, explained in `codes.py`
     moves   (k,) indices of the motions, ascending
@@ -33,6 +43,7 @@ class Finding:
     hint    what to do about it
     turns   (k,) whether that axis is rotary, so that the value is in degrees; or empty
     ranges  axis letter -> its range in words; or empty
+    kind    problem or remark
     """
 
     code: str
@@ -43,11 +54,12 @@ class Finding:
     hint: str = ""
     turns: tuple[bool, ...] = ()
     ranges: Mapping[str, str] = field(default_factory=dict)
+    kind: FindingKind = FindingKind.PROBLEM
 
     @classmethod
-    def of(cls, code: str, moves: Index, text: str, hint: str = "") -> Finding:
+    def of(cls, code: str, moves: Index, text: str, hint: str = "", kind: FindingKind = FindingKind.PROBLEM) -> Finding:
         """A finding without figures."""
-        return cls(code, moves, np.zeros(len(moves)), text, hint=hint)
+        return cls(code, moves, np.zeros(len(moves)), text, hint=hint, kind=kind)
 
     def __len__(self) -> int:
         return len(self.moves)
@@ -88,11 +100,6 @@ ORDER = (
     "NCF410",
 )
 """Codes in the order in which they are reported: those of limits, then those of a plan."""
-ONCE = frozenset({"NCF409", "NCF456", "NCF283"})
-"""Codes that hold for the whole program, and are reported for its first motion only."""
-COUNTED = "NCF285"
-"""The code reported for the first cut, with the number of cuts, their axes, and the largest figure."""
-
 
 NoteKey = tuple[int, str, str, str]
 """(position of block delete, code, text, hint)."""
@@ -100,8 +107,9 @@ NoteKey = tuple[int, str, str, str]
 
 @mutable
 class Found:
-    """The first few messages of one kind, and the number of all; of counted ones axes and largest figure."""
+    """The first few messages of one finding, and the number of all; of counted ones axes and largest figure."""
 
+    kind: FindingKind
     shown: list[Message] = field(default_factory=list)
     count: int = 0
     axes: frozenset[str] = frozenset()
@@ -128,16 +136,17 @@ class Notes:
     def add(self, finding: Finding, program: Program, moves: Moves, own: Mask | None = None, position: int = 0) -> None:
         """Add a finding of a part, in a position of block delete; `own` (n,): the motions to include, None: all."""
         rows = np.arange(len(finding)) if own is None else np.flatnonzero(own[finding.moves])
-        rows = rows[:1] if finding.code in ONCE else rows
+        rows = rows[:1] if finding.kind is FindingKind.ONCE else rows
         shown = []
-        counted = finding.code == COUNTED
+        counted = finding.kind is FindingKind.COUNTED
         for k in rows[: 1 if counted else MOST].tolist():
             place = program.place(int(moves.block[finding.moves[k]]))
             text = finding.text if counted else finding.sentence(k)
             shown.append(Message(finding.code, text, place, finding.hint))
         axes = frozenset("".join(finding.axes[k] for k in rows.tolist())) if counted else frozenset[str]()
         most = float(finding.values[rows].max(initial=0.0))
-        self._take((position, finding.code, finding.text, finding.hint), Found(shown, len(rows), axes, most))
+        key = position, finding.code, finding.text, finding.hint
+        self._take(key, Found(finding.kind, shown, len(rows), axes, most))
 
     def take(self, other: Notes) -> None:
         """Add the findings of a later part."""
@@ -145,9 +154,9 @@ class Notes:
             self._take(key, found)
 
     def _take(self, key: NoteKey, found: Found) -> None:
-        if key[1] in ONCE and key in self.found:
+        note = self.found.setdefault(key, Found(found.kind))
+        if note.kind is FindingKind.ONCE and note.count:
             return
-        note = self.found.setdefault(key, Found())
         note.shown += found.shown[: max(MOST - note.count, 0)]
         note.count += found.count
         note.axes, note.most = note.axes | found.axes, max(note.most, found.most)
@@ -156,7 +165,7 @@ class Notes:
         """The messages, by position of block delete and in `ORDER`, without duplicates."""
         messages: list[Message] = []
         for (_, code, *_), note in sorted(self.found.items(), key=lambda each: (each[0][0], ORDER.index(each[0][1]))):
-            if code == COUNTED:
+            if note.kind is FindingKind.COUNTED:
                 messages += [note.counted()] if note.count else []
                 continue
             messages += note.shown

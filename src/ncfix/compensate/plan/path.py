@@ -39,7 +39,7 @@ from ncfix.compensate.plan.ends import (
     with_closed_circles,
     with_rotary_as_it_stands,
 )
-from ncfix.compensate.plan.findings import Finding
+from ncfix.compensate.plan.findings import Finding, FindingKind
 from ncfix.compensate.plan.intent import Intent, crooked
 from ncfix.compensate.plan.offset import OffsetPoints, beside_contours
 from ncfix.compensate.plan.sampling import too_long
@@ -364,7 +364,7 @@ def _not_far_off(intent: Intent, rows: Index) -> Index:
 def not_split(rows: Index, deviation: Array) -> Finding:
     """NCF413: motions (k,) that would have to be split but must not be; `deviation` (k,) mm."""
     text = "the tool tip leaves the intended path by {value:.1f} um, and this motion must not be split"
-    return Finding("NCF413", rows, deviation * 1e3, text)
+    return Finding("NCF413", rows, deviation * 1e3, text, kind=FindingKind.REMARK)
 
 
 def _remarks(
@@ -380,7 +380,7 @@ def _remarks(
     if unknown.size:
         text = "the radius of the tool is not known: what the control makes of corners beside it is not in the figures"
         hint = "give it as --tool NUMBER=LENGTH,RADIUS"
-        remarks.append(Finding.of("NCF455", unknown, text, hint))
+        remarks.append(Finding.of("NCF455", unknown, text, hint, FindingKind.REMARK))
     done = np.flatnonzero(~unchanged)
     if intent.came is not None and (unsure := _sides_unknown(intent, done, budget.tolerance)):
         remarks.append(unsure)
@@ -388,11 +388,12 @@ def _remarks(
         text = (
             "rounding to the control's digits alone moves the tool tip by up to {value:.2f} um, on top of the tolerance"
         )
-        remarks.append(Finding("NCF409", done[:1], np.array([budget.rounding * 1e3]), text))
+        figure = np.array([budget.rounding * 1e3])
+        remarks.append(Finding("NCF409", done[:1], figure, text, kind=FindingKind.ONCE))
     held = done[~oriented[done]]
     if strategy.corrects_orientation and held.size:
         text = "the tool direction is not, or not fully, corrected here"
-        remarks.append(Finding.of("NCF410", held, text))
+        remarks.append(Finding.of("NCF410", held, text, kind=FindingKind.REMARK))
     return remarks
 
 
@@ -422,7 +423,8 @@ def _sides_unknown(intent: Intent, rows: Index, tolerance: float) -> Finding:
     far = np.where(off > tolerance, off, 0.0)
     which = np.flatnonzero(far.any(axis=1))
     axes = tuple("".join(np.array(intent.moves.axes)[row > 0]) for row in far[which])
-    return Finding("NCF285", rows[which], far[which].max(axis=1, initial=0.0) * 1e3, SIDE, axes, SIDE_HINT)
+    most = far[which].max(axis=1, initial=0.0) * 1e3
+    return Finding("NCF285", rows[which], most, SIDE, axes, SIDE_HINT, kind=FindingKind.COUNTED)
 
 
 def _unknown_radius(intent: Intent, unchanged: Mask) -> Index:

@@ -15,7 +15,7 @@ from pathlib import Path
 import sympy as sp
 
 from ncfix.diagnostics import ConfigError, NcfixError, Place
-from ncfix.inputs import MAX_CONFIG_BYTES, taken
+from ncfix.inputs import MAX_CONFIG_BYTES, content_of
 from ncfix.machine.symbolic.chain import UNITS, Chain, Expr, Rotation, Size, Step, Translation, Variable
 from ncfix.toml_text import Report, TomlTable, decoded, did_you_mean, key_lines, parsed
 
@@ -38,7 +38,7 @@ UNIT_TO = 1e-9
 def load_chain(path: str | Path) -> Chain:
     """The chain that a file describes; raises `ConfigError` with every fault found (NCF302 ... NCF305, NCF391)."""
     try:
-        source = taken(os.fspath(path), MAX_CONFIG_BYTES)
+        source = content_of(os.fspath(path), MAX_CONFIG_BYTES)
     except OSError as error:
         raise ConfigError.of("NCF300", f"cannot read the chain file: {error.strerror}", Place(str(path))) from error
     return loads_chain(decoded(source, str(path), "NCF301"), str(path))
