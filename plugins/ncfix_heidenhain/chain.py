@@ -303,9 +303,10 @@ def axis_errors(
     turned = np.zeros(SAMPLES)
     if described.rotary:
         turned, curve[:, index] = sense * curve[:, index], 0.0
-    lever = np.array([1.0] * 3 + [MAX_LEVER_MM] * 3) * 8
+    lever = np.array([1.0] * 3 + [MAX_LEVER_MM] * 3)
     parts = np.concatenate([curve * lever, np.stack([turned + own, turned - own], axis=1) * lever[index]], axis=1)
-    count = max(nodes_needed(fine, part, most, target) for part in parts.T)
+    share = target / parts.shape[1]  # so that all parts together leave no more than the target
+    count = max(nodes_needed(fine, part, most, share) for part in parts.T)
     step = round((high - low) / described.unit / (count - 1), 4)
     nodes = (round(low / described.unit, 4) + step * np.arange(count)) * described.unit
     fit = projector(fine, nodes)

@@ -12,7 +12,7 @@ import pytest
 from certificate.planting import GIVEN, cases
 from ncfix.certificate.certificate import Subject
 from ncfix.certificate.coordinates import Given
-from ncfix.certificate.expected import Expected
+from ncfix.certificate.expected import Expected, ProofTask
 from ncfix.certificate.proof import prove
 from ncfix.certificate.reading import READERS, Family
 from ncfix.certificate.text import Lines, Text
@@ -74,7 +74,7 @@ def test_lines_of_a_shape_are_followed_as_one_by_one() -> None:
             slow = replace(one_by_one, lines=[replace(line, plain=False) for line in text.lines])
             assert any(line.plain for line in text.lines)
             ways = (text, one_by_one, slow)
-            steps = [[*Expected(each, each, case.machine, GIVEN).ours.values()] for each in ways]
+            steps = [[*Expected(ProofTask(each, each, case.machine, GIVEN)).ours.values()] for each in ways]
             assert repr(steps[0]) == repr(steps[2])
             assert repr(steps[0]) == repr(steps[1])  # NaN is NaN
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,23 @@ def parts(steps: Indices) -> Iterator[Indices]:
     return (steps[first : first + PART] for first in range(0, len(steps), PART))
 
 
+class ProofTask(NamedTuple):
+    """The programs to be compared, and what is needed to follow them.
+
+    first, second  the original and its correction
+    tolerance_um   tolerance of the way; that of the stamp of the correction takes precedence
+    turn           see `AxisFollower.run`, for programs with the same loops; without effect if errors depend on
+                   direction
+    """
+
+    first: Text
+    second: Text
+    machine: Machine
+    given: Given
+    tolerance_um: float = 1.0
+    turn: int | None = None
+
+
 class Expected:
     """The steps of an original (`ours`, n) and of its correction (`theirs`), and the expected ends of the correction.
 
@@ -49,19 +66,9 @@ class Expected:
     told        (n,) whether it is known where the corrected line should lead
     """
 
-    def __init__(
-        self,
-        first: Text,
-        second: Text,
-        machine: Machine,
-        given: Given,
-        tolerance_um: float = 1.0,
-        turn: int | None = None,
-    ) -> None:
-        """Follow both programs.
-
-        turn  see `AxisFollower.run`, for programs with the same loops; without effect if errors depend on direction
-        """
+    def __init__(self, task: ProofTask) -> None:
+        """Follow both programs."""
+        first, second, machine, given, tolerance_um, turn = task
         self.first, self.second, self.given = first, second, given
         x, y, z = (a + b for a, b in zip(machine.workpiece_offset, given.workpiece_offset, strict=True))
         placed = ((x, y, z), dict(given.inputs))

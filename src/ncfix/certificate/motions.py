@@ -8,17 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from ncfix.arrays import Mask
-from ncfix.certificate.coordinates import Given
 from ncfix.certificate.deviations import ASIDE, FEW, HALF_TURN, MANY, NO_ANSWER, Deviations, Moved
-from ncfix.certificate.expected import SLACK, WHOLE_TURN
+from ncfix.certificate.expected import SLACK, WHOLE_TURN, ProofTask
 from ncfix.certificate.findings import BlockProof
 from ncfix.certificate.following import NO_CENTRE, NO_POLE
 from ncfix.certificate.model import Ways
 from ncfix.certificate.pairing import LinePair
 from ncfix.certificate.reading import Family
 from ncfix.certificate.steps import NO_CIRCLE, AxisStep, Kind
-from ncfix.certificate.text import Indices, Text
-from ncfix.machine import Machine
+from ncfix.certificate.text import Indices
 
 TURNED = 1e-9
 """Difference, rad, up to which rotary positions agree; `SLACK` for linear ones."""
@@ -34,22 +32,14 @@ UNSURE = "which added lines belong to which block is not known"
 class MotionJudge(Deviations):
     """Judges motions that this reader can follow; the results are added to `proof`."""
 
-    def __init__(
-        self,
-        first: Text,
-        second: Text,
-        machine: Machine,
-        given: Given,
-        tolerance_um: float,
-        turn: int | None,
-    ) -> None:
-        super().__init__(first, second, machine, given, tolerance_um, turn)
-        self.turn = turn or 0
-        self.machine_hash = machine.hash
-        self.proof = BlockProof(stamp=second.stamp)
+    def __init__(self, task: ProofTask) -> None:
+        super().__init__(task)
+        self.turn = task.turn or 0
+        self.machine_hash = task.machine.hash
+        self.proof = BlockProof(stamp=task.second.stamp)
         self.polar: set[int] = set()
-        if second.family is Family.KLARTEXT:
-            self.polar = {row for row, line in second.apart() if line.word("PA")}
+        if task.second.family is Family.KLARTEXT:
+            self.polar = {row for row, line in task.second.apart() if line.word("PA")}
         """Lines of the corrected program with an angle about a pole, whose digits limit the accuracy of the place."""
         self.begin_apart: set[int] = set()
         """Motions that begin elsewhere in another position of block delete, or in another execution of their line:

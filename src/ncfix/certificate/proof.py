@@ -16,7 +16,7 @@ import numpy as np
 
 from ncfix.arrays import Mask
 from ncfix.certificate.coordinates import Given
-from ncfix.certificate.expected import parts
+from ncfix.certificate.expected import ProofTask, parts
 from ncfix.certificate.findings import BlockFault, BlockProof
 from ncfix.certificate.flow import LineOrder
 from ncfix.certificate.following import MOST_TURNS, positions, skips
@@ -52,9 +52,9 @@ def prove(
             first, second = first.without_block_numbers(), second.without_block_numbers()
         settings = positions(first, given) if b"/" in original else [given]
         turn = 0 if len(settings) == 1 and LineOrder.are_alike(first, second) else None
-        prover, *others = (Prover(first, second, machine, each, tolerance_um, turn) for each in settings)
+        prover, *others = (Prover(ProofTask(first, second, machine, each, tolerance_um, turn)) for each in settings)
         for more in range(1, min(max(prover.turns.values(), default=1), MOST_TURNS)):
-            others.append(Prover(first, second, machine, given, tolerance_um, more))
+            others.append(Prover(ProofTask(first, second, machine, given, tolerance_um, more)))
         pairing = prover.paired()
         for each in others:
             steps = ((row, prover.ours[row], each.ours[row]) for row in each.ours if row in prover.ours)
