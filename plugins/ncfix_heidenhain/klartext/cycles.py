@@ -24,6 +24,7 @@ from ncfix_heidenhain.klartext import transformations
 from ncfix_heidenhain.klartext.arcs import IN_PLANE, Step
 from ncfix_heidenhain.klartext.contours import LEFT_OUT, VALUE, number
 from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, HolePosition, KlartextControl
+from ncfix_heidenhain.klartext.planes import cycle_19
 from ncfix_heidenhain.klartext.plans import QParameters
 from ncfix_heidenhain.klartext.targets import (
     FramePosition,
@@ -33,7 +34,6 @@ from ncfix_heidenhain.klartext.targets import (
     polar_axes,
     programmed_position,
 )
-from ncfix_heidenhain.klartext.transformations import cycle_19
 
 NO_CYCLE = "NCF272"
 DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})

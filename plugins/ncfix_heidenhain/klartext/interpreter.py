@@ -21,7 +21,7 @@ from ncfix.control.trace import NotInPartsError
 from ncfix.diagnostics import Place, SourceError
 from ncfix.text.reach import UNREAD
 from ncfix.text.tree import Command, Opaque, Program, Template
-from ncfix_heidenhain.klartext import cycles, lines, transformations
+from ncfix_heidenhain.klartext import cycles, lines, planes, transformations
 from ncfix_heidenhain.klartext.arc_text import relies_at_once
 from ncfix_heidenhain.klartext.arcs import Step, circular, circular_by_radius, circular_polar, tangential
 from ncfix_heidenhain.klartext.blocks import unread_line
@@ -231,7 +231,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         elif name.startswith("cycl def "):
             cycles.define(control, name.removeprefix("cycl def "), words, self.names(plan, flow))
         elif name.startswith("plane "):
-            transformations.plane(control, name.removeprefix("plane "), words, plan.flags)
+            planes.plane(control, name.removeprefix("plane "), words, plan.flags)
         elif name.startswith("trans datum"):
             if name.endswith("reset"):
                 transformations.reset_datum(self.control)

@@ -13,6 +13,7 @@ from ncfix.control.posture import WayRules
 from ncfix.control.tcp import led_in_machine, switch
 from ncfix_heidenhain.klartext.arcs import FLAT, Step
 from ncfix_heidenhain.klartext.control import DEPARTED, SPATIAL_ANGLES, SPATIAL_MODE, KlartextControl
+from ncfix_heidenhain.klartext.planes import check_normal
 from ncfix_heidenhain.klartext.targets import (
     MotionWords,
     command_of,
@@ -23,7 +24,6 @@ from ncfix_heidenhain.klartext.targets import (
     polar_axes,
     programmed_position,
 )
-from ncfix_heidenhain.klartext.transformations import check_normal
 
 MACHINE_COORDINATES = "machine coordinates ({})"
 NOT_GIVEN = "where the axis {} stands after M92 depends on its zero point (references.M92 in the setup)"
