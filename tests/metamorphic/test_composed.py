@@ -100,3 +100,36 @@ def test_what_compositions_have_found(name: str, root: Path) -> None:
     dialect = {"B": "heidenhain", "G": "siemens", "%": "fanuc"}[FOUND[name][0]]
     made = Composition(AUTHORS[dialect], dialect, machine, COMPOSED, replace(OPTIONS, flatten=True), ())
     assert not corrected(FOUND[name], made).refused
+
+
+LEAVING_THE_POLE = {
+    "siemens": (
+        "G710 G17 G40 G90 G94\nT1 D1 M6\nG54\nG0 A0 C0\nTRAORI\nG54\nORIAXES\n"
+        "G0 X10 Y0 Z60 A3=0.1 B3=0 C3=0.9949874\nG1 X15 Y1 Z50 A3=0.12 B3=0.01 C3=0.99 F500\nM30\n"
+    ),
+    "fanuc": (
+        "%\nO1\nG21 G90 G94 G54\nG0 X10. Y0. Z230. A0. C0.\nG43.5 H1\n"
+        "G1 X10. Y0. Z60. I0.1 J0. K0.995 F500.\nX15. Y1. Z50. I0.12 J0.01 K0.99\nG49\nM30\n%\n"
+    ),
+    "heidenhain": (
+        "BEGIN PGM R MM\nTOOL CALL 1 Z S1000\nL X+10 Y+0 Z+100 A+0 C+0 FMAX\nM128\n"
+        "LN X+10 Y+0 Z+60 TX+0.1 TY+0 TZ+0.9949874 F500\nLN X+15 Y+1 Z+50 TX+0.12 TY+0.01 TZ+0.99\n"
+        "M129\nM30\nEND PGM R MM\n"
+    ),
+}
+"""From the pole two ways of the rotary axes lead to the first direction, and both are equally far."""
+
+
+@pytest.mark.parametrize("dialect", LEAVING_THE_POLE)
+def test_a_direction_with_two_ways_about_as_near_stays_as_programmed(dialect: str, root: Path) -> None:
+    machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
+    made = Composition(AUTHORS[dialect], dialect, machine, COMPOSED, replace(OPTIONS, strategy="full"), ())
+    found = corrected(LEAVING_THE_POLE[dialect], made)
+    assert not found.refused
+    first = {
+        "siemens": "A3=0.1 B3=0 C3=0.9949874",
+        "fanuc": "I0.1 J0. K0.995",
+        "heidenhain": "TX+0.1 TY+0 TZ+0.9949874",
+    }
+    assert first[dialect] in found.text
+    assert found.text.count("0.12 ") == 0, "the next direction is corrected"

@@ -90,6 +90,8 @@ def directed(control: MacroControl, block: Block, motion: int) -> str:
         block.values[LETTERS[index]] = (angle - control.offset[index]) / DEGREE
         block.axes |= 1 << index
     control.points = True
+    if found.is_close:
+        control.builder.keeps_direction()
     control.whole |= motion != 0 and found.strays
     return ""
 

@@ -76,7 +76,11 @@ def pointed(control: KlartextControl, words: MotionWords) -> dict[int, float] | 
     if vector is None or not control.m128:
         return None
     found = control.postures([dot(row, vector) for row in control.rotation], IN_TRAVEL)
-    return found.chosen if found is not None and found.ways else None
+    if found is None or not found.ways:
+        return None
+    if found.is_close:
+        control.builder.keeps_direction()
+    return found.chosen
 
 
 def straight_polar(control: KlartextControl, step: Step) -> None:

@@ -144,6 +144,8 @@ def by_direction(control: Sinumerik, words: BlockWordValues) -> str:
         words.forms[LETTERS[index]] = "ac"
         words.axes |= 1 << index
     control.points = True
+    if found.is_close:
+        control.builder.keeps_direction()
     control.builder.says_the_way(mask_of(found.letters))
     even = control.modes.orientation == BY_AXES or control.modal.motion == 0
     words.whole |= not even and found.strays
@@ -220,9 +222,8 @@ def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Seque
     at_will = True
     for both, is_even in zip(ways, even, strict=True):
         nearer = nearest(both, here)
-        if (at_will and pointing.leaves_pole(here, nearer)) or not (
-            is_even or pointing.stray(here, nearer[0]) <= MAX_PLANE_DEVIATION_RAD
-        ):
+        undecided = (at_will and pointing.leaves_pole(here, nearer)) or pointing.is_close(here, nearer)
+        if undecided or not (is_even or pointing.stray(here, nearer[0]) <= MAX_PLANE_DEVIATION_RAD):
             break
         outer, inner = nearer[0]
         here = (

@@ -135,6 +135,7 @@ class MotionBuilder:
         self._resting: dict[int, int] = {}
         self._measured: dict[int, int] = {}
         self._directed: list[tuple[int, int, int]] = []
+        self._kept: list[int] = []
         self.overturned: int | None = None
         self.brought_back: int | None = None
 
@@ -233,6 +234,10 @@ class MotionBuilder:
         begin = self.count if first is None else first
         self._directed.append((begin, begin + motions, axes))
 
+    def keeps_direction(self) -> None:
+        """Mark the next motion: its rotary axes stay as programmed."""
+        self._kept.append(self.count)
+
     def extend(self, stretch: MotionColumns) -> None:
         """Add a stretch of motions."""
         self._flush()
@@ -271,6 +276,7 @@ class MotionBuilder:
         start, end = _joined_ends(parts, self.columns)
         named = (np.arange(1 << N_LETTERS)[:, None] >> np.array(self.columns)) & 1 != 0
         styles: dict[str, Any] = self._style_columns(style)
+        styles["rotary_as_programmed"][[row for row in self._kept if row < len(block)]] = True
         programmed = named.take(mask, axis=0, mode="clip")
         n, width = len(block), len(self.columns)
         counted = self._mask_column(self._counted, np.broadcast_to(styles["incremental"][:, None], (n, width)))

@@ -97,6 +97,14 @@ class Pointing:
         """Whether the tool is to leave a pole, where it is parallel to the outer axis: then neither way is nearer."""
         return len({*ways}) > 1 and self.at_pole(self.at(*here)) and not self.at_pole(self.at(*ways[0]))
 
+    def is_close(self, here: Pair, ways: Sequence[Pair]) -> bool:
+        """Whether two ways are about equally far from the angles `here`: a small change of these decides."""
+        if len(ways) < 2:
+            return False
+        (outer, inner), (other, another) = ways[:2]
+        near, far = abs(outer - here[0]) + abs(inner - here[1]), abs(other - here[0]) + abs(another - here[1])
+        return far - near < CLOSE_RAD
+
     def stray(self, start: tuple[float, float], stop: tuple[float, float]) -> float:
         """Angle, rad, between the tool at the mean axis angles and the middle of the plane arc between the ends."""
         middle = self.at((start[0] + stop[0]) / 2, (start[1] + stop[1]) / 2)
@@ -138,6 +146,8 @@ Pair = tuple[float, float]
 
 EQUALITY_TOLERANCE = 1e-9
 """Difference of directions and lines (unit vectors, mm) below which they count as equal."""
+CLOSE_RAD = 0.05
+"""Difference of two ways, rad, summed over both axes, within which corrections could make the other one the nearer."""
 POLE_ANGLE_RAD = 1e-7
 """Smallest angle, rad, between tool and outer axis; below it the angle of the outer axis is free."""
 

@@ -87,6 +87,11 @@ class Postures:
         return self.pointing.leaves_pole(self.here, self.ways)
 
     @property
+    def is_close(self) -> bool:
+        """Whether another way is about as near as the first."""
+        return self.pointing.is_close(self.here, self.ways)
+
+    @property
     def strays(self) -> bool:
         """Whether evenly turning axes move the tool out of the plane between the two directions."""
         return self.pointing.stray(self.here, self.ways[0]) > MAX_PLANE_DEVIATION_RAD

@@ -38,6 +38,7 @@ INVERSE_TIME, PER_MINUTE = "93", "94"
 
 FROM_NOWHERE = "an increment in turned coordinates, while where one of their axes stands is not known"
 TOO_SHORT = "the motion takes so little time that its F in inverse time (G93) would be larger than {:.10g}"
+OTHER_WAY = "from a corrected start the control would turn the rotary axes another way to this direction of the tool"
 NO_TIME = "the block would become several, and in G93 no number behind its own F says how long it takes"
 
 
@@ -342,6 +343,7 @@ class BlockWriter(BlockText):
         """Correct the words of the tool direction, and turn the rotary axes of `position` to where they lead."""
         turning, target = list(self.turning), self.target
         if len(target.ends) == 1 and (np.abs(end - target.nominal)[turning] < self.half[turning]).all():
+            self._turn(position, target.nominal)
             position[turning] = target.nominal[turning]
             return
         for angle in self.layout.angles.values():
@@ -382,16 +384,19 @@ class BlockWriter(BlockText):
         return list(map(self._component, self.spelling.vector, self._vector(end)))
 
     def _turn(self, position: Array, end: Array) -> None:
-        """Turn the rotary axes of `position` to where the direction as written leads them.
+        """Turn the rotary axes of `position` to where the direction as written leads them; an axis that is free stays.
 
-        The control is taken to choose the posture nearest to the intended one; an axis whose angle is free stays.
+        Sets a conflict if another way there is about as near as the intended one, and the control would take that.
         """
         target, turning = self.target, list(self.turning)
         assert target.pointing is not None
         vector = target.rotation @ np.array(self._vector(end))
         here, there = (np.radians(each[turning]) + target.offset[turning] for each in (position, end))
-        ways = target.pointing.angles(vector / np.linalg.norm(vector), (float(here[0]), float(here[1])))
+        near = float(here[0]), float(here[1])
+        ways = target.pointing.angles(vector / np.linalg.norm(vector), near)
         found = min(ways, key=lambda way: float(np.abs(np.array(way) - there).sum()))
+        if found is not ways[0] and target.pointing.is_close(near, ways):
+            self.out.conflict = self.out.conflict or OTHER_WAY
         position[turning] = np.degrees(np.array(found) - target.offset[turning])
 
     # -- further pieces -----------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from ncfix.text.language import BlockLayout, language_of
 from ncfix.text.tree import Program, view
 from ncfix.text.writer import Edit, Splices, overlong
 from ncfix.values import frozen
-from ncfix.writer.block import STRAIGHT_AND_ARCS
+from ncfix.writer.block import OTHER_WAY, STRAIGHT_AND_ARCS
 from ncfix.writer.bulk import Bulk, write_alone
 from ncfix.writer.language import WrittenLanguage
 from ncfix.writer.pieces import Pieces, SecondReading
@@ -290,6 +290,8 @@ class _Emitter:
         rendered = self.language.writer(self.program, block, layout, target, self.spelling).write()
         if rendered.conflict:
             self.conflicts.setdefault(block, rendered.conflict)
+        if rendered.conflict == OTHER_WAY:
+            self._keep_start(row)
         ends, frame = np.array(rendered.ends), self.frames[self.reading.frame[row]]
         self.end[rows] = frame.command(ends)
         if rendered.centre is not None:
@@ -308,6 +310,16 @@ class _Emitter:
             self.latest.append(block)
         elif self.written[block].text != rendered.text:
             self.conflicts.setdefault(block, SEVERAL_STATES)
+
+    def _keep_start(self, row: int) -> None:
+        """Keep the motions before a row, too, that say where its rotary axes start: only from there it goes its way."""
+        pointing = self.moves.pointing
+        assert pointing is not None
+        free = True
+        while free and row:
+            row -= 1
+            self.conflicts.setdefault(int(self.moves.block[row]), OTHER_WAY)
+            free = pointing.at_pole(pointing.direction(self.moves.end[row]))
 
     def _target(self, row: int, rows: slice) -> Target:
         moves, pieces = self.moves, self.pieces
