@@ -232,8 +232,8 @@ def uses_comma(source: bytes) -> bool:
 @lru_cache(maxsize=4)
 def axis_numbers(source: bytes) -> tuple[int, int]:
     """The number of axis words with a decimal comma, and of those with a point; the latter is 0 if none has a comma."""
-    commas = len(re.findall(rb"[XYZABC][+-]?\d*,\d", source)) if b"," in source else 0
-    return commas, len(re.findall(rb"[XYZABC][+-]?\d*\.\d", source)) if commas else 0
+    commas = len(re.findall(rb"[XYZABCxyzabc][+-]?\d*,\d", source)) if b"," in source else 0
+    return commas, len(re.findall(rb"[XYZABCxyzabc][+-]?\d*\.\d", source)) if commas else 0
 
 
 @lru_cache(maxsize=4)

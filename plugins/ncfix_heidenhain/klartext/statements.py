@@ -444,7 +444,7 @@ FORMS: tuple[tuple[str, Do], ...] = (
     # FUNCTION statements that leave coordinates as they are; others (turning, parallel axes, corrections, another
     # kinematic model by MODE MILL) may not.
     (
-        r"FUNCTION\s+(RESET\s+)?(AFC|DWELL|FEED|S-PULSE|DCM|LIFTOFF|COUNT|MODE\s+MILL\s*\Z|DRESS\s+END|FLUTES|FILE)",
+        r"FUNCTION\s+(RESET\s+)?(AFC|CORRDATA\s+RESET|DWELL|FEED|S-PULSE|DCM|LIFTOFF|COUNT|MODE\s+MILL\s*\Z|DRESS\s+END|FLUTES|FILE)",
         lambda control, flow, found: None,
     ),
     # FN 17 and 25 write into the control's own data: datums, presets, tools.

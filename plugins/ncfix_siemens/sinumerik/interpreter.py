@@ -51,6 +51,7 @@ from ncfix_siemens.sinumerik.unit import HEAD, PROCEDURE, SinumerikUnit, units_o
 from ncfix_siemens.sinumerik.vocabulary import (
     ASYNCHRONOUS,
     BY_THEMSELVES,
+    COUPLING,
     GO_SOMEWHERE,
     MOTIONS,
     OF_THE_CONTROL,
@@ -76,6 +77,7 @@ PERHAPS = re.compile(rb"[Mm][ \t]*=[ \t]*0*6")
 
 AFTER_POSITIONING = "where the axis {} stands after it was positioned by itself is not followed"
 POLYNOMIALS = UNFOLLOWED_MOTIONS[MOTIONS["poly"]]
+SPINDLE = re.compile(r"S\d+")
 DESELECTED = frozenset({"tcarr", "cutmod"})
 """Names whose value zero deactivates what other values activate; activation is refused."""
 
@@ -368,6 +370,10 @@ def note_letting(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None
     if OF_THE_CONTROL.match(step.name):
         why = f"the program sets {step.name.upper()}, which may change coordinates or tool lengths"
         control.refuse_rest(why)
+    elif COUPLING.match(step.name):
+        named = [each(control) for each in step.index or step.listed or filter(None, [step.value])]
+        if not all(isinstance(each, str) and SPINDLE.fullmatch(each) for each in named):
+            control.refuse_rest(f"an axis that follows another ({step.name.upper()}) is not followed")
     elif step.name in PROBING:
         turn.special.add("meas")
     elif step.index and step.name.upper() in INDEX:

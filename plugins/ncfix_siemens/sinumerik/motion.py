@@ -54,7 +54,7 @@ DWELL = Passing(Pass.DWELL, "dwell")
 AFTER_MEASURING = "where the axis {} stands after measuring is known only at run time"
 REFERENCE = {
     code: Passing(Pass.REFERENCE_POINT, words)
-    for code, words in ((740, "reference point (G74)"), (750, "fixed point (G75)"))
+    for code, words in ((740, "reference point (G74)"), (750, "fixed point (G75)"), (7510, "fixed point (G751)"))
 }
 AFTER_REFERENCE = "where the axis {} stands after a reference or fixed point is not given"
 SOFT_APPROACH = frozenset({1470, 1480, 2470, 2480, 3470, 3480})
@@ -185,7 +185,7 @@ def measure(control: Sinumerik, words: BlockWordValues) -> None:
 
 
 def to_reference(control: Sinumerik, words: BlockWordValues, code: int) -> None:
-    """Execute G74 and G75: the named axes (also `X1=0`) move to a fixed point of the machine."""
+    """Execute G74, G75 and G751: the named axes (also `X1=0`) move to a fixed point of the machine."""
     named = [INDEX[address[0]] for address in words.values if address[:1] in INDEX]
     gone = tuple(index for index in dict.fromkeys(named) if index in control.axis_indices)
     reasons = dict.fromkeys((*gone, *(GEOMETRY if gone and control.tcp else ())), AFTER_REFERENCE)

@@ -27,6 +27,7 @@ from ncfix_siemens.sinumerik.plans import LISTS, AssignedVariable, Calling, Sinu
 from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.unit import SinumerikUnit
 from ncfix_siemens.sinumerik.vocabulary import (
+    COUPLED,
     DRILLING,
     ENDED_BY,
     HARMLESS,
@@ -178,7 +179,7 @@ STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
 WORKING_AREA = frozenset({250, 260})
 """G25 and G26, whose words are limits of the working area or of the spindle."""
 FOR_THIS_BLOCK = {530: "g53", 1530: "g153", 630: "g63"} | dict.fromkeys(motion.SOFT_APPROACH, "soft")
-TAKES_WORDS = frozenset({40, 740, 750, 580, 590}) | POLES | WORKING_AREA
+TAKES_WORDS = frozenset({40, 580, 590, *motion.REFERENCE}) | POLES | WORKING_AREA
 
 
 @mutable
@@ -245,6 +246,8 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
         call_by_text(control, turn, step, find)
     elif name == "cycle832":
         tolerance(control, step)
+    elif name in COUPLED and not names_axis(control, step):
+        return
     elif name in UNFOLLOWED:
         control.suspend(name, f"{UNFOLLOWED[name]} is in force, which ncfix does not follow")
     elif name in ("orimks", "oriwks"):
@@ -269,6 +272,14 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
         cycle(control, turn.words, step, modal=turn.modal)
     else:
         subprogram(control, turn, step, find)
+
+
+def names_axis(control: Sinumerik, step: Calling) -> bool:
+    """Whether the first argument of a call may be an axis of the machine: no other name, and no `SPI(2)`."""
+    if not step.written or (isinstance(step.written[0], FunctionCall) and step.written[0].name == "spi"):
+        return False
+    named = step.arguments[0](control)
+    return not isinstance(named, str) or INDEX.get(named) in control.axis_indices
 
 
 def supa(control: Sinumerik, turn: Turn, step: Calling) -> None:

@@ -82,16 +82,16 @@ _HARMLESS = """
     compof compcurv compcad compon compsurf upath spath stamac rmi rmb rme rmn cfc cftcp cfin fgroup fgref
     cut2d cut2df cut3dc cut3df cut3dff cut3dfs kontc kontt normal gwpson gwpsof tmon tmof fpr fpraon fpraof newconf
     cancel group_begin group_end group_addend punchacc sof soff pdelayon pdelayof spif1 spif2
-    coupdef coupdel coupon coupof couponc coupofs waitc ctabdel resetmon tang adisposa
+    coupdef coupdel waitc ctabdel resetmon tang adisposa
     protd protz proa cutconon cutconof rtlion rtliof delt getselt delobj
     oric orid orirota orirotr orirott orirotc orison orisof oriaxpos
     drfof delayfston delayfstof fendnorm icycof icycon eauto enat etan bauto bnat btan prepro
     workpiece setpiece norm kont sons cprecon cprecof spath lftxt lfwp lfpos clearm init start isvar
     tangdel tlift cut3dcc cut3dccd cut2dd cut2dfd cut3dcd cut3dfd rmbbl rmibl rmebl rmnbl
     osof osc oss osse osd ost
-    towstd towmcs towwcs towbcs towtcs towkcs walcs4 walcs5 walcs6 walcs7 walcs8 walcs9 walcs10
+    scc deltoolenv toolenv towstd towmcs towwcs towbcs towtcs towkcs walcs4 walcs5 walcs6 walcs7 walcs8 walcs9 walcs10
     iptrlock iptrunlock actblocno extopen extclose protdef cprot cprotdef nprot nprotdef prots collpair
-    afison afisof auxfudel auxfudelg auxfumseq auxfusync axtochan blsync callpath chandata coupofs coupres ctablock
+    afison afisof auxfudel auxfudelg auxfumseq auxfusync axtochan blsync callpath chandata coupres ctablock
     ctabunlock deldl delmt deltc esrr esrs fctdef finea coarsea ipobrka lock unlock polfa polfmask polfmlin qeclrnon
     qeclrnof rdisable sirelin sirelout splinepath stopreof comppath dyn3d cycle62 waitenc ipoenda
 """
@@ -133,6 +133,8 @@ UNFOLLOWED = {
     "ftocon": "an online tool offset (FTOCON)",
     "trailon": "coupled axes (TRAILON)",
     "leadon": "coupled axes (LEADON)",
+    "coupon": "an axis that follows another (COUPON)",
+    "couponc": "an axis that follows another (COUPONC)",
     "egon": "an electronic gear (EGON)",
     "egonsyn": "an electronic gear (EGONSYN)",
     "egonsyne": "an electronic gear (EGONSYNE)",
@@ -164,6 +166,8 @@ ENDED_BY = {
     "ftocof": frozenset({"ftocon"}),
     "trailof": frozenset({"trailon"}),
     "leadof": frozenset({"leadon"}),
+    "coupof": frozenset({"coupon", "couponc"}),
+    "coupofs": frozenset({"coupon", "couponc"}),
     "tangof": frozenset({"tangon"}),
     "egofs": frozenset({"egon", "egonsyn", "egonsyne"}),
 }
@@ -179,6 +183,12 @@ ASYNCHRONOUS = {
 }
 """Names that, with an axis as index, `OS[Z]=1`, move it by itself -> description."""
 
+COUPLED = frozenset({"coupon", "couponc"})
+"""Names of `UNFOLLOWED` that concern spindles, unless their first argument is an axis."""
+
+COUPLING = re.compile(r"cpl?on$")
+"""Names whose assignment switches a generic coupling on: `CPON=X`, `CPLON[X]=Y`."""
+
 POLYNOMIAL = "po"
 GO_SOMEWHERE = frozenset({"pos", "posa", "posp", "ax"})
 BY_THEMSELVES = frozenset(ASYNCHRONOUS) | GO_SOMEWHERE | {POLYNOMIAL}
@@ -187,10 +197,10 @@ UNSEEN = {"fxs": "travel to a fixed stop (FXS)", "g": "a G code that is named by
 """Names that, with an index, change later motions in a way that is not followed -> description."""
 
 OF_THE_CONTROL = re.compile(
-    r"\$(?:p_\w*fr|tc_(?:dp|[se]cp|adpt|carr)|m[nca]_|aa_(?:off|etrans)|ac_trans|sn_cec_)|toff|tcarr$|cutmodk?$|mtl$"
+    r"\$(?:p_\w*fr|n[tk]_|tc_(?:dp|[se]cp|adpt|carr)|m[nca]_|aa_(?:off|etrans)|ac_trans|sn_cec_)|toff|tcarr$|cutmodk?$|mtl$"
     r"|\$sc_(?:mirror_tool|wear_|tool_length_(?:type|const_t$)|tool_temp|tocarr|toframe)"
 )
-"""Names, lower case, whose assignment changes frames, tool lengths or machine data."""
+"""Names, lower case, whose assignment changes frames, tool lengths, kinematic chains or machine data."""
 
 TURNS_OF_THE_TOOL = frozenset({"orivect", "oriaxes", "oriplane", "oripath", "oripaths", "oricurve"})
 TURNS_OF_THE_TOOL |= {"oriconcw", "oriconccw", "oriconio", "oriconto"}

@@ -7,6 +7,7 @@ import pytest
 from ncfix.control.moves import MotionKind, Rule
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import SourceError
+from ncfix_heidenhain.klartext.layout import axis_numbers
 from program.klartext.tnc import KNOWN, ends, fixed, follow
 
 
@@ -242,3 +243,13 @@ def test_a_pole_with_one_coordinate_and_none_before_is_not_known() -> None:
     assert ends("L X+5 Y+5 Z+0 FMAX\nCC X+1 Y+2\nCC X+0\nLP PR+5 PA+0 F100")[-1] == [5, 2, 0]
     with pytest.raises(SourceError, match="NCF271"):
         follow("L X+5 Y+5 Z+0 FMAX\nCC X+0\nLP PR+5 PA+0 F100")
+
+
+def test_corrections_of_a_table_end() -> None:
+    assert fates("L X+0 Y+0 Z+0 FMAX\nFUNCTION CORRDATA RESET\nL X+5 F100")[-1] == (Rule.CORRECT, "")
+    begun = fates("L X+0 Y+0 Z+0 FMAX\nFUNCTION CORRDATA TCS #1\nFUNCTION CORRDATA RESET\nL X+5 F100")[-1]
+    assert begun[0] == Rule.REFUSE
+
+
+def test_decimal_commas_of_words_in_lower_case() -> None:
+    assert axis_numbers(b"1 l x+1,5 y-2.5 z+3") == (1, 1)

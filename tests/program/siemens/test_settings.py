@@ -36,7 +36,15 @@ def test_the_axes_are_not_known_behind_an_additive_offset() -> None:
 
 
 @pytest.mark.parametrize(
-    "setting", ["$SC_TOOL_LENGTH_TYPE=1", "$SC_MIRROR_TOOL_LENGTH=TRUE", "$SC_WEAR_SIGN=1", "$SN_CEC_TABLE_ENABLE[0]=1"]
+    "setting",
+    [
+        "$SC_TOOL_LENGTH_TYPE=1",
+        "$SC_MIRROR_TOOL_LENGTH=TRUE",
+        "$SC_WEAR_SIGN=1",
+        "$SN_CEC_TABLE_ENABLE[0]=1",
+        "$NT_TRAFO_INDEX[1]=2",
+        "$NK_OFF_DIR[3,0]=0.01",
+    ],
 )
 def test_setting_data_that_lengths_and_errors_depend_on(setting: str) -> None:
     assert setting.split("=")[0].split("[")[0] in reasons(follow(f"G0 X1\n{setting}\nX2"))[-1]
@@ -76,3 +84,29 @@ def test_a_program_is_followed_as_it_cuts(name: str) -> None:
 def test_what_acts_by_blocks_needs_them_whole(body: str, whole: list[bool]) -> None:
     """A further block would begin the action, the call or the stroke anew, or end what acts in one block only."""
     assert on_the_cradle(body).moves.whole.tolist()[1:] == whole
+
+
+@pytest.mark.parametrize(
+    "coupling", ["COUPON(C,A)", "COUPONC(C,S1)", "COUPON(AXNAME(NAME),S1)", "CPON=C", "CPON=(A,C)", "CPLON[C]=A"]
+)
+def test_an_axis_that_follows_another(coupling: str) -> None:
+    found = reasons(on_the_cradle(f"G1 X1 F100\n{coupling}\nX2"))
+    assert not found[1]
+    assert "follows another" in found[2]
+
+
+@pytest.mark.parametrize("coupling", ["COUPON(S2,S1)", "COUPON(SPI(2),SPI(1),45)", "COUPON", "CPON=S2", "CPLON[S2]=S1"])
+def test_a_spindle_that_follows_another(coupling: str) -> None:
+    assert not any(reasons(on_the_cradle(f"G1 X1 F100\n{coupling}\nX2")))
+
+
+def test_a_coupling_ends() -> None:
+    found = reasons(on_the_cradle("COUPON(C,A)\nG1 X1 F100\nCOUPOF(C,A)\nG0 X2 Y2 Z2 A0 C0"))
+    assert [bool(each) for each in found] == [False, True, False]
+
+
+@pytest.mark.parametrize("block", ["G751 X1=0", "G751 FP=2 X10 Y5", "G75 FP=2 X1=0"])
+def test_a_fixed_point_is_where_the_control_says(block: str) -> None:
+    found = reasons(on_the_cradle(f"{block}\nG0 X2 Y2 Z2 A0 C0"))
+    assert "fixed point" in found[1]
+    assert not found[2]
