@@ -40,7 +40,7 @@ from ncfix_heidenhain.klartext.statements import (
     statement,
 )
 from ncfix_heidenhain.klartext.targets import MotionWords, set_pole
-from ncfix_heidenhain.klartext.units import KlartextUnit
+from ncfix_heidenhain.klartext.units import KlartextUnit, unit_of_feed
 
 if TYPE_CHECKING:
     from ncfix_heidenhain.klartext.flatten import KlartextFlattener
@@ -161,7 +161,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
             raise SourceError.of(fault.code, fault.text, control.locate(), fault.hint) from None
         self.flow = KlartextFlow(control, self.main, self.find)
         control.locate = self.place
-        control.modal.unit = control.modal.per_feed = self.main.mm
+        control.modal.unit, control.modal.per_feed = self.main.mm, unit_of_feed(self.main.mm)
         control.unit_said = True
         control.recompose()
 
@@ -329,15 +329,22 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
     def feed(self, words: MotionWords, plan: KlartextPlan) -> None:
         """Set the feed: F per minute or (M136) per revolution, FU per revolution, FAUTO that of TOOL CALL.
 
+        Per minute it counts in mm or tenths of an inch, per revolution in mm or inches.
+
         FZ (per tooth) and FT (by time) leave it unknown. The feed of RND and CHF is only that of the corner.
         """
         modal = self.control.modal
         if plan.name in CORNERS:
             return
-        for address, mode in (("F", 95 if self.control.per_revolution else 94), ("FU", 95), ("FZ", 95), ("FT", 94)):
+        revolving = self.control.per_revolution or any(code == 136 for code, _ in plan.codes)
+        for address, mode in (("F", 95 if revolving else 94), ("FU", 95), ("FZ", 95), ("FT", 94)):
             if address in words.values:
                 known = address not in words.unknown and address in ("F", "FU")
-                modal.feed = words.values[address] * modal.per_feed if known else math.nan
+                unit = unit_of_feed(modal.unit) if mode == 94 else modal.unit
+                if unit != modal.per_feed:
+                    modal.per_feed = unit
+                    self.control.recompose()
+                modal.feed = words.values[address] * unit if known else math.nan
                 modal.feed_mode = mode
         if "fauto" in plan.flags:
             modal.feed = self.control.auto_feed

@@ -32,7 +32,7 @@ from ncfix_heidenhain.klartext.cycles import pattern_of
 from ncfix_heidenhain.klartext.plans import KlartextPlan
 from ncfix_heidenhain.klartext.targets import MotionWords
 from ncfix_heidenhain.klartext.transformations import is_plain, trans
-from ncfix_heidenhain.klartext.units import KlartextUnit
+from ncfix_heidenhain.klartext.units import KlartextUnit, unit_of_feed
 
 NO_LABEL = "NCF276"
 PROGRAM = "program"
@@ -217,7 +217,7 @@ def call_tool(
     if isinstance(tool, Unknown):
         tool = tool.why
     if "F" in words.values:
-        control.auto_feed = words.values["F"] * control.modal.per_feed
+        control.auto_feed = words.values["F"] * unit_of_feed(control.modal.unit)
     if tool is None and "DR" in words.values:
         control.tools.cutter = math.nan
     if tool is None and "DL" not in words.values:

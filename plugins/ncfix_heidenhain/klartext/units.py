@@ -143,6 +143,11 @@ UNIT = re.compile(r"\b(MM|INCH)\s*\Z", re.IGNORECASE)
 MM_PER_UNIT = {"MM": 1.0, "INCH": 25.4}
 
 
+def unit_of_feed(unit: float) -> float:
+    """mm per unit of a feed per minute: in inch programs a tenth of an inch; `unit`: mm per unit of length."""
+    return unit if unit == MM_PER_UNIT["MM"] else unit / 10
+
+
 class KlartextUnit(TextUnit[KlartextPlan]):
     """One Klartext program.
 

@@ -404,3 +404,10 @@ def test_only_what_the_control_puts_in_is_known_at_run_time() -> None:
     body = "Q1 = 3\nFN 18: SYSREAD Q2 = ID50 NR1 IDXQ1\nL X+Q1\nL Y+Q2"
     assert len(reasons(body)) == 1
     assert len(reasons("FN 23: Q20 = CDATA Q30\nL X+Q22 FMAX")) == 1
+
+
+def test_feeds_of_inch_programs_are_tenths_per_minute_and_inches_per_revolution() -> None:
+    body = "TOOL CALL 1 Z F50\nL X+1 F100\nL X+2 FU2\nL X+3 F30\nL X+4 F AUTO\nL X+5 F3 M136"
+    moves = follow(body, unit="INCH").moves
+    assert moves.feed.tolist() == pytest.approx([254.0, 50.8, 76.2, 127.0, 76.2])
+    assert moves.feed_mode.tolist() == [94, 95, 94, 94, 95]
