@@ -55,6 +55,15 @@ def test_a_short_program_waits_for_nothing_it_does_not_need(verb: str, root: Pat
     assert families(modules) == {"ncfix_iso.rs274"}
 
 
+def test_fix_for_a_control_whose_tolerance_of_arcs_hangs_on_the_unit_waits_for_nothing_more(
+    root: Path, tmp_path: Path
+) -> None:
+    program = tmp_path / "part.nc"
+    program.write_text("O1\nG21 G90 G17 G94 G54\nG1 X1. Y2. Z3. F500.\nG2 X2. Y3. I1. J0.\nM30\n")
+    given = ["-m", "benchmarks/five_axis.toml", "--dialect", "fanuc", "--assume-zero", "-o", str(tmp_path / "out.nc")]
+    assert not imported(["fix", str(program), *given], root) & ELSEWHERE
+
+
 @pytest.mark.parametrize(
     ("program", "needed"),
     [

@@ -329,7 +329,7 @@ def closure_of(dialect: Dialect, moves: Moves) -> Closure:
     If the control's least increment of 0.001 mm becomes 0.0001 inch in inch programs, so does this tolerance in arcs
     that are all in inches.
     """
-    frames = np.unique(moves.frame[moves.kind == MotionKind.ARC]).tolist() if dialect.decimal_inches else []
+    frames = set(moves.frame[moves.kind == MotionKind.ARC].tolist()) if dialect.decimal_inches else set()
     inches = bool(frames) and all(moves.frames[frame].unit > 1.0 for frame in frames)
     return Closure(dialect.closure_mm * (INCH / 10 if inches else 1.0), dialect.closure_relative)
 
