@@ -71,7 +71,9 @@ def _is_many(moved: Array) -> bool:
 
 def _weights(moved: Array, weight: Weight) -> Array:
     """(m,) the weight of each column."""
-    return np.broadcast_to(np.asarray(weight, dtype=np.float64).reshape(-1), moved.shape[1:2]).copy()
+    found = np.empty(moved.shape[1])
+    found[:] = weight if isinstance(weight, float) else weight.reshape(-1)
+    return found
 
 
 def turn(angle: Array) -> tuple[Array, Array]:
