@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from conftest import FULL
 from ncfix.diagnostics import ExitCode
 
 CEC = """%_N_NC_CEC_INI
@@ -113,8 +114,13 @@ def test_the_same_file_twice_is_one(tmp_path: Path, ncfix: Any) -> None:
     assert len(json.loads(ncfix("lint", path, path, "--json").out)["files"]) == 1
 
 
-@pytest.mark.parametrize("settings", [(), ("grids=one", "negate=XZ"), ("steps=even", "fit=area")])
-@pytest.mark.parametrize("name", ["three_axis", "angle_head"])
+SETTINGS = [(), ("grids=one", "negate=XZ"), ("steps=even", "fit=area")]
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [*(("angle_head", each) for each in SETTINGS), *(("three_axis", each) for each in SETTINGS[: 3 if FULL else 1])],
+)
 def test_nothing_is_said_of_what_export_has_written_for_isg(
     tmp_path: Path, ncfix: Any, root: Path, name: str, settings: tuple[str, ...]
 ) -> None:

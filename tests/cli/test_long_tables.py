@@ -10,12 +10,13 @@ from typing import Any
 
 import pytest
 
-from conftest import some
+from conftest import FULL, some
 from ncfix.cli.programs import Motions
 from ncfix.cli.simulate import Errors
 from ncfix.diagnostics import ExitCode
 
-PARTS = (1000, 10_000)
+LINES = 800 if FULL else 240
+PARTS = (1000, 10_000 if FULL else 4000)
 WHOLE = 1 << 30
 HEAD = ["%", "(LONG)", "G21 G90 G94 G54 G17 F900.", "G0 X10. Y20. Z5. B0. C0."]
 GIVEN = ("--dialect", "linuxcnc", "--assume-zero")
@@ -25,7 +26,7 @@ FIVE, PLAY = "benchmarks/five_axis.toml", "examples/machines/wCBXFZYSt.toml"
 def text() -> bytes:
     """Cuts there and back with axes turning round, arcs, holes, rapids, places in machine coordinates, and dwells."""
     found = list(HEAD)
-    for k in range(800):
+    for k in range(LINES):
         found.append(f"G1 X{10 + abs(k % 140 - 70):.3f} Y{20 + k % 9:.3f} Z{5 + k % 4}. B{k % 11}. C{-20 + k % 43}.")
         if k % 40 == 13:
             found += [f"G2 I{3 + k % 5}. J1.", "G4 P0.1"]

@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 
 from cli.conftest import LONG_X, PROGRAM, THREE_AXIS
+from conftest import FULL
 from ncfix.cli.main import run
 from ncfix.diagnostics import ExitCode, Message, Place, visible
 
@@ -32,8 +33,10 @@ PAYLOADS = {
     "back": "safe\rEVIL",
     "eight bits": "\x9b31m\x9d0;owned\x9c",
 }
+TRIED = list(PAYLOADS) if FULL else ["all", "back"]
 if os.environ.get("NCFIX_CONTROLS"):
     PAYLOADS |= {f"U+{ord(char):04X}": char for char in CONTROLS}
+    TRIED = list(PAYLOADS)
 ALLOWED = "\t\n"
 STEERING = re.compile(f"[{re.escape(''.join(set(CONTROLS) - set(ALLOWED)))}]")
 
@@ -201,7 +204,7 @@ machine check -
 """.strip().splitlines()
 
 
-@pytest.mark.parametrize("title", PAYLOADS)
+@pytest.mark.parametrize("title", TRIED)
 def test_nothing_comes_through(title: str, on_a_terminal: Any, tmp_path: Path) -> None:
     evil = PAYLOADS[title]
     words = {"e": evil, **{letter: letter + evil.replace("\n", "") for letter in "pmd"}}

@@ -11,7 +11,7 @@ import pytest
 
 from compensate.test_plain import AMONG, winding
 from compensate.test_stream import OPTIONS, SETUP, program, streamed
-from conftest import some
+from conftest import FULL, some
 from ncfix.compensate.driver import PartCorrector
 from ncfix.compensate.following import Task
 from ncfix.compensate.parts import MachineParts, Part
@@ -122,7 +122,7 @@ def test_processes_pass_over_parts_of_each_other(jobs: int, machine: Machine, mo
         return resume(self, checkpoint, text)
 
     monkeypatch.setattr(MachineParts, "_passed", counted)
-    for seed in range(3):
+    for seed in range(3 if FULL else 1):
         source = winding(seed, 400, 0.01, (*AMONG, "#100=1.5"))
         expected = streamed(source, machine, 2000)
         passed.clear()

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from compensate.side import compared
-from conftest import FULL
+from conftest import FULL, some
 from ncfix.compensate import FixOptions
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import follow
@@ -173,7 +173,7 @@ def test_blocks_that_are_missing_or_too_many(machine: Machine, change: object, l
     assert max(each.max for each in found) >= least_mm
 
 
-@pytest.mark.parametrize("seed", range(6 if FULL else 3))
+@pytest.mark.parametrize("seed", range(some(6)))
 def test_blocks_exchanged_on_a_line_give_the_same_in_any_parts(machine: Machine, seed: int) -> None:
     """Rows to and fro, so near to each other that the next one is mistaken for the one that is meant."""
     rng, perfect = np.random.default_rng(seed), replace_errors(machine)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from compensate.streaming import run
-from conftest import some
+from conftest import FULL, some
 from ncfix.compensate import FixOptions, driver, report
 from ncfix.compensate.driver import fix_program
 from ncfix.compensate.following import Task
@@ -48,6 +48,12 @@ def unstamped(text: bytes) -> bytes:
     return found
 
 
+@pytest.fixture(scope="module")
+def again(machine: Machine) -> bytes:
+    """A program with two decimals that was corrected and has lost its stamp."""
+    return unstamped(corrected(pocket(2, seed=1), machine)[0])
+
+
 @pytest.mark.parametrize("decimals", [0, 2, 3])
 def test_a_program_that_lost_its_stamp_is_refused(machine: Machine, decimals: int) -> None:
     once, codes = corrected(pocket(decimals, seed=1), machine)
@@ -75,11 +81,9 @@ def test_a_few_round_numbers_are_no_proof(machine: Machine) -> None:
     assert "NCF438" not in codes
 
 
-@pytest.mark.parametrize("size", [500, 1500])
-def test_a_program_in_parts_is_judged_by_more_than_the_first(machine: Machine, size: int) -> None:
+@pytest.mark.parametrize("size", [500, 1500] if FULL else [500])
+def test_a_program_in_parts_is_judged_by_more_than_the_first(machine: Machine, again: bytes, size: int) -> None:
     """Too little is in each part to tell; it is told before anything of the program is passed on."""
-    once, _ = corrected(pocket(2, seed=1), machine)
-    again = unstamped(once)
     task = Task(machine, SETUP, OPTIONS, None, "part.ngc", get("linuxcnc"), size)
     for jobs in (1, 2):
         with pytest.raises(RefusedError) as caught:
@@ -90,10 +94,10 @@ def test_a_program_in_parts_is_judged_by_more_than_the_first(machine: Machine, s
     assert [message.code for message in done.report.warnings] == [message.code for message in whole.report.warnings]
 
 
-def test_the_beginning_of_a_long_program_is_judged(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_beginning_of_a_long_program_is_judged(
+    machine: Machine, again: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """As a whole and in parts: what comes behind those lines makes no difference."""
-    once, _ = corrected(pocket(2, seed=1), machine)
-    again = unstamped(once)
     monkeypatch.setattr(report, "LOOKED", 10)
     monkeypatch.setattr(driver, "LOOKED", 10)
     _, codes = corrected(again, machine)

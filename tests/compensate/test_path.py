@@ -7,7 +7,7 @@ import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import SAMPLES, Arc, changed, dense_errors, motions, plan
-from conftest import some
+from conftest import FULL, some
 from ncfix.compensate.plan.strategies import get_strategy
 from ncfix.control.moves import MotionKind, Moves, Rule
 from ncfix.machine import Effect, Machine, State
@@ -51,8 +51,14 @@ def test_short_blocks_through_random_poses(kind: str, tcp: bool, capsys: pytest.
     assert worst < TOLERANCE
 
 
-@pytest.mark.parametrize("strategy", STRATEGIES)
-@pytest.mark.parametrize(("kind", "tcp"), CONTROLS)
+@pytest.mark.parametrize(
+    ("kind", "tcp", "strategy"),
+    [
+        (*control, strategy)
+        for at, control in enumerate(CONTROLS)
+        for strategy in (STRATEGIES if FULL else STRATEGIES[at % 3 :][:1])
+    ],
+)
 def test_long_blocks_and_arcs(kind: str, tcp: bool, strategy: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Blocks through half of the working space, with tables, splines and harmonics to be followed."""
     rng = np.random.default_rng(sum(map(ord, kind + strategy)) + tcp)

@@ -154,8 +154,7 @@ UNITS = [kind for kind in CASES if kind.split(":")[0] in ("unit of values", "inc
 
 
 SEVERAL = [(kind, repeated) for repeated in (False, True) for kind in [*UNITS, "tool length: m"]]
-FEW = [("inch", False), ("degree", False), ("tool length: m", False)]
-FEW += [("unit of values: inch", False), ("unit of values: um", True)]
+FEW = [("inch", False), ("tool length: m", False), ("unit of values: um", True)]
 """Repeats change what values in another unit say of the noise; in one file each unit is found by `CASES`."""
 
 
@@ -215,7 +214,7 @@ MISPLACED = [(kind, change) for kind in ("gauge", "bar", "probe") for change in 
 MISPLACED = [pair for pair in MISPLACED if pair[0] != "probe" or "lengths" not in pair[1]]
 
 
-@pytest.mark.parametrize(("kind", "change"), MISPLACED if FULL else MISPLACED[::3])
+@pytest.mark.parametrize(("kind", "change"), MISPLACED if FULL else MISPLACED[1::4])
 def test_positions_in_every_column_that_holds_them(kind: str, change: str, known: Machine) -> None:
     """Both ends of a length, the centre of a bar, what a probe reads: X is X whatever its column is called."""
     right = simulate(plan(known, kind, 80, 3), known, Faults(2.0), 3)
