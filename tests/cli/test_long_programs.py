@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from conftest import FULL
 from ncfix.compensate.driver import Stream, Streamed
 from ncfix.diagnostics import ExitCode
 
@@ -55,7 +56,7 @@ def test_a_file(long_program: Path, fix: Any, tmp_path: Path) -> None:
     }
 
 
-@pytest.mark.parametrize(("jobs", "part"), [(2, 1700), (3, PART)])
+@pytest.mark.parametrize(("jobs", "part"), [(2, 1700), (3, PART)] if FULL else [(3, PART)])
 def test_several_processes(jobs: int, part: int, long_program: Path, fix: Any, tmp_path: Path) -> None:
     alone = fix(part, "-", stdin=long_program.read_bytes())
     assert alone.code == ExitCode.DONE, alone.err

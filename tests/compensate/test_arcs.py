@@ -7,6 +7,7 @@ import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
 from compensate.motions import SAMPLES, Arc, changed, dense_errors, motions, plan, sweep_of
+from conftest import FULL
 from ncfix.compensate.plan.arcs import Closure, turns_begun
 from ncfix.compensate.plan.path import Plan
 from ncfix.compensate.plan.strategies import get_strategy
@@ -36,9 +37,11 @@ def worst(machine: Machine, moves: Moves, result: Plan) -> float:
     return float(np.nanmax(errors))
 
 
-@pytest.mark.parametrize("normal", NORMALS)
-@pytest.mark.parametrize("sweep", [0.4, -1.5, np.pi, -5.9, 2 * np.pi, -2 * np.pi])
-@pytest.mark.parametrize("rise", [0.0, 8.0])
+SWEEPS = (0.4, -1.5, np.pi, -5.9, 2 * np.pi, -2 * np.pi)
+ARCS = [(normal, sweep, rise) for rise in (0.0, 8.0) for sweep in SWEEPS for normal in NORMALS]
+
+
+@pytest.mark.parametrize(("normal", "sweep", "rise"), ARCS if FULL else ARCS[::5])
 def test_arcs_stay_arcs_on_a_good_machine(normal: tuple[float, ...], sweep: float, rise: float) -> None:
     machine = gentle()
     begin = np.array([12.0, -7.0, 20.0])

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 from diagnose.plates import PLATES, clear_patterns, mill, plain, plate
-from ncfix.diagnosis.diagnosis import UNKNOWN, diagnose
+from ncfix.diagnosis.diagnosis import UNKNOWN, Diagnosis, diagnose
 from ncfix.diagnosis.presentation import text
 
 README = {
@@ -35,17 +36,24 @@ def test_a_clear_pattern_without_a_name_is_said_whatever_the_noise(shared: Calla
     assert "dx is bent like an S along Y" in text(found)
 
 
-def test_a_bow_is_not_taken_for_a_little_of_everything(shared: Callable[[str], Path]) -> None:
+@pytest.fixture(scope="module")
+def diagnosed(shared: Callable[[str], Path]) -> Callable[[str], Diagnosis]:
+    """What is found on a plate, by its name."""
+    return cache(lambda name: diagnose([plate(shared("measurements"), name)], mill()))
+
+
+def test_a_bow_is_not_taken_for_a_little_of_everything(
+    shared: Callable[[str], Path], diagnosed: Callable[[str], Diagnosis]
+) -> None:
     """Bowed by 11 um along Y, F = 47."""
-    data = plate(shared("measurements"), "D8131")
-    found = diagnose([data], mill())
+    data, found = plate(shared("measurements"), "D8131"), diagnosed("D8131")
     assert clear_patterns(data) == ["dy by YY (F = 47)"]
     assert found.rest.pattern_um > 4.0
 
 
 @pytest.mark.parametrize("name", EXPECTED)
-def test_scales_and_squareness_are_named(name: str, shared: Callable[[str], Path]) -> None:
-    found = diagnose([plate(shared("measurements"), name)], mill())
+def test_scales_and_squareness_are_named(name: str, diagnosed: Callable[[str], Diagnosis]) -> None:
+    found = diagnosed(name)
     names = {each.candidate.name for each in found.findings}
     assert (found.verdict == UNKNOWN) == (name == "D1597A, 2003")  # whose rest is larger than the scale
     assert names >= EXPECTED[name] or ("EC0X" in names and "EC0Y" in EXPECTED[name])
