@@ -2,8 +2,8 @@
 
 Judged as holes are, by an interpreter and a model of the machine that share nothing with the product. The figures of
 contours that a control offsets are those of points within their elements, so they are not compared with those at ends.
-A usual run takes a third of the kinds for each strategy. The second reader, which does not know the cycle, finds no
-fault from its call on.
+A usual run takes each plane and form once, with one of the strategies. The second reader, which does not know the
+cycle, finds no fault from its call on.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def test_every_point_is_corrected_or_refused(root: Path, figures: Callable[[str]
     for shift, strategy in enumerate(("rotary-then-linear", "full")):
         tally = Tally()
         for number, kind in enumerate(KINDS):
-            if FULL or (number + number // 3) % 3 == shift:
+            if FULL or ((number + number // 3) % 3 == shift and number // 3 % 2 == shift):
                 text, tally.wrong = program(*kind), []
                 fixed = judged(text, strategy, model, machine, tally)
                 proof = prove(text.encode(), fixed.text, machine, given_of(SETUP, get("siemens")), "siemens")

@@ -20,7 +20,7 @@ from ncfix.control.moves import TcpState, UnknownAxes
 
 FIRST = int(os.environ.get("NCFIX_SEED", "0"))
 SEEDS = range(FIRST, FIRST + int(os.environ.get("NCFIX_UNSAID", "1")))
-KINDS = None if os.environ.get("NCFIX_UNSAID") else 8 if FULL else 5
+KINDS = None if os.environ.get("NCFIX_UNSAID") else 8 if FULL else 4
 """Of the 32 or 40 kinds of programs so many are judged by default, others with each strategy."""
 
 
