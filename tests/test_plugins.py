@@ -115,10 +115,10 @@ FAULTS = {
                                 "did you mean CycleTable?"),
     "what derive objects to": ("from ncfix.plugin import family\nfamily('iso').derive('x', title='X', suffix='.x')\n",
                                r"ValueError: x: .* no suffix: did you mean suffixes\? \(third_party_bad.py:2\)",
-                               "tell its author"),
+                               "report it to its author"),
     "while it registers": (GOOD + "@hookimpl\ndef register_bases(register): 1 / 0\n",
                            r"failed in register_bases: ZeroDivisionError: .* \(third_party_bad.py:\d+\)",
-                           "tell its author"),
+                           "report it to its author"),
 }  # fmt: skip
 """Plugins that are left out, what is said of them, and the hint."""
 

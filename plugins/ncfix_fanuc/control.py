@@ -75,8 +75,9 @@ ORDER_FORM = SettingForm("XYZ, ZYX, ...: each axis once", lambda text: sorted(te
 TEMPLATE = "N{no}A1P{dx}A2P{dy}A3P{dz};"
 FITS = {"auto": (False, True), "nodes": (False,), "area": (True,)}
 ROTARY_NOTES = {
-    "zero": "The grid is that of {} at zero; elsewhere more is left (rotary=middle shares it out).",
-    "middle": "The grid lies in the middle of what all positions of {} ask for, and is exact at none.",
+    "zero": "The grid is exact with {} at zero; at other angles the remaining error is larger (rotary=middle "
+    "distributes it).",
+    "middle": "The grid is the middle of the corrections at all positions of {}, and exact at none.",
 }
 LEVEL = 0.1
 """Share of the target: an end of the travel with a smaller change need not be covered, because the edge value holds."""
@@ -94,7 +95,7 @@ class Fanuc(FileControl):
         position_frame="machine coordinates",
         unit="detection unit times magnification; positions mm",
         quantum=(1e-4, 0.0),
-        extrapolation="taken as held at the outermost nodes (FANUC-4)",
+        extrapolation="the value of the outermost node is assumed to hold (FANUC-4)",
         bidirectional=True,
         max_points=SIDE**3,
         max_tables=1,
@@ -148,7 +149,7 @@ class Fanuc(FileControl):
         "template": Option("", f"a line of the text file, ASSUMED, e.g. {TEMPLATE}"),
         "fit": Option(
             "auto",
-            "nodes: exact at the points; area: least squares around them; auto: area if nodes miss more",
+            "nodes: exact at the points; area: least squares around them; auto: area where nodes have the larger error",
             one_of(*FITS),
         ),
         "rotary": Option(
@@ -160,7 +161,7 @@ class Fanuc(FileControl):
         **BACKLASH_OPTIONS,
     }
     steps = (
-        "Settle the assumptions below on the machine, sign first.",
+        "Check the assumptions below on the machine, the sign first.",
         PLACING_STEP,
         "Set the magnification as volume.json has it.",
         "Write the records of volume.json with cnc_wrvolc, or type in volume.csv.",
@@ -221,7 +222,7 @@ class GridFilling:
         """From the settings; raises `UsageError` NCF485 and `RefusedError` NCF484."""
         if not set(LINEAR) <= set(request.machine.axis_names):
             text = f"the grid is over X, Y and Z; the machine has {' '.join(request.machine.axis_names)}"
-            raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
+            raise RefusedError.of("NCF484", text, hint="correct the programs instead: ncfix fix")
         sign = settings["sign"]
         unit = float(settings["detection_unit_um"]) / 1000
         fit, rotary = settings["fit"], settings["rotary"]
@@ -236,7 +237,10 @@ class GridFilling:
         magnification = _magnification(values, self.style.largest * self.unit)
         if magnification > MOST_GRID_MAGNIFICATION:
             text = f"a value of {float(np.abs(values).max()):.3f} mm needs a magnification of {magnification}"
-            hint = f"the control takes {MOST_GRID_MAGNIFICATION}; a larger detection unit, or is the error in mm?"
+            hint = (
+                f"the control takes at most {MOST_GRID_MAGNIFICATION}; use a larger detection unit, or check that "
+                "the error is in mm"
+            )
             raise RefusedError.of("NCF484", text, hint=hint)
         whole = np.rint(sense_of(self.sign) * values / (magnification * self.unit)).astype(np.int64)
         placing = Placing.of(self.reference, mesh.grid.nodes)
@@ -287,14 +291,18 @@ class GridFilling:
         """Notes: the grid, and the error that is left."""
         request, style = self.request, self.style
         counts = " x ".join(map(str, mesh.grid.counts))
-        missed = f"it misses {1e3 * mesh.left:.2f} um at most, rounding included"
+        missed = f"its error is {1e3 * mesh.left:.2f} um at most, rounding included"
         yield f"Grid {counts}: {mesh.grid.points} points; {missed}."
         if volc.placing is not None:
             yield from volc.placing.notes(LINEAR, mesh.grid.counts, volc.step, "mm")
         rounding = volc.magnification * self.unit / 2
         yield f"Magnification {volc.magnification}: a value is rounded by up to {1e3 * rounding:.2f} um."
         if rounding > request.target:
-            cure = f"values have {style.largest} steps only" if volc.magnification > 1 else "a smaller unit would help"
+            cure = (
+                f"values have {style.largest} steps only"
+                if volc.magnification > 1
+                else ("use a smaller detection unit")
+            )
             yield f"The rounding is larger than the target: {cure}."
         if mesh.left > request.target:
             yield f"The target of {1e3 * request.target:g} um is not reached with {SIDE} points an axis."

@@ -31,7 +31,7 @@ from ncfix.values import frozen
 from ncfix_fanuc import json_values
 
 SIGNS = ("correction", "error")
-SIGNED = "correction: values are added to the command; error: they are taken off it"
+SIGNED = "correction: values are added to the command; error: they are subtracted from it"
 UNITS: Mapping[str, Option] = {
     "detection_unit_um": Option("0.1", "detection unit of linear axes, um", number(1e-3, 10)),
     "detection_unit_deg": Option("0.0001", "detection unit of rotary axes and of angles, degree", number(1e-6, 10)),
@@ -66,7 +66,9 @@ HOMING = SettingForm(
 )
 BACKLASH_OPTIONS: Mapping[str, Option] = {
     "play": Option(
-        "yes", "yes: play goes into the backlash compensation of the axes; no: it is left", one_of("yes", "no")
+        "yes",
+        "yes: play is written to the backlash compensation of the axes; no: it stays uncorrected",
+        one_of("yes", "no"),
     ),
     "home_minus": Option("", "axes of X, Y and Z whose reference position return goes towards minus, e.g. XY", HOMING),
 }
@@ -210,7 +212,7 @@ def anchors(request: Request, settings: Mapping[str, str], inputs: Sequence[str]
         if not low - CLOSE <= place <= high + CLOSE:
             what = "" if name in given else ", which is taken to be machine zero,"
             text = f"the reference position of {name}, {place:g}{what} is not between {low:g} and {high:g}"
-            text += ": the control puts the grid by the point that lies there"
+            text += ": the control places the grid by the point at that position"
             hint = (
                 f"--set {REFERENCE}={name}POSITION, where {name} stands after its reference position return (machine "
             )
@@ -268,7 +270,9 @@ def placed(
     """The first position along each axis of a grid by its parameters, and its `Placing`; None for old files without."""
     said = json_values.reals(record, f"{FIRST}_{unit}", len(step))
     if POINTS not in record:
-        text = f"does not say which point lies at the reference position: the control cannot put the grid ({POINTS})"
+        text = (
+            f"does not state which point is at the reference position, so the control cannot place the grid ({POINTS})"
+        )
         remarks.doubt(0, text, "export again")
         return said, None
     numbers = json_values.wholes(record, POINTS)
@@ -280,7 +284,7 @@ def placed(
     first = placing.first(step)
     if any(abs(one - other) > CLOSE for one, other in zip(first, said, strict=True)):
         text = f"by {REFERENCE}_{unit}, {POINTS} and the intervals the grid begins at {list(first)}"
-        remarks.refuse(0, f"{text}, and {FIRST}_{unit} says {list(said)}", "the control goes by the former")
+        remarks.refuse(0, f"{text}, and {FIRST}_{unit} says {list(said)}", "the control uses the first")
     return first, placing
 
 
@@ -306,7 +310,10 @@ class BacklashAmounts:
         }
         for axis in [axis for axis in LINEAR if abs(found.get(axis, 0)) > LARGEST_BACKLASH]:
             text = f"the play of {axis} is {found[axis]} detection units, and parameter {BACKLASH_PARAMETER} holds "
-            hint = "--set detection_unit_um=... as it is on the control; --set play=no leaves the play"
+            hint = (
+                "give --set detection_unit_um=... as on the control, or --set play=no, which leaves the play "
+                "uncorrected"
+            )
             raise RefusedError.of("NCF484", f"{text}{LARGEST_BACKLASH}", hint=hint)
         return cls(tuple(found.get(axis, 0) for axis in LINEAR), home)
 
@@ -348,7 +355,9 @@ def read_backlash(files: Files, home_minus: str) -> tuple[BacklashAmounts, list[
     amounts = dict.fromkeys(range(1, len(LINEAR) + 1), 0)
     for record in read_records(remarks):
         if record.number != BACKLASH_PARAMETER or record.kind != "A":
-            remarks.refuse(0, f"parameter {record.number} is not for here", f"N0{BACKLASH_PARAMETER}A1P..A2P..A3P..;")
+            remarks.refuse(
+                0, f"parameter {record.number} does not belong in this file", f"N0{BACKLASH_PARAMETER}A1P..A2P..A3P..;"
+            )
             continue
         for axis, value in record.values:
             if axis not in amounts or float(value) != round(float(value)) or abs(float(value)) > LARGEST_BACKLASH:

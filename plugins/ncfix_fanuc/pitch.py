@@ -73,7 +73,7 @@ class FanucPitch(FileControl):
         Assumption(
             "PITCH-1",
             "The sign of the values is what --set sign says.",
-            "none of the public pages says it",
+            "none public",
             "none: it must be given",
             "Load +7 at one point: does the axis go farther (correction) or less far (error) beyond it?",
         ),
@@ -108,7 +108,7 @@ class FanucPitch(FileControl):
         "first_number": Option("1", "number of the first point that is free on the control", whole(0, MOST_NUMBER)),
     }
     steps = (
-        "Settle PITCH-1 on the machine.",
+        "Check PITCH-1 on the machine.",
         "Save parameters and pitch data; set parameter 3605#0 to 0 (one table for both ways).",
         "See that no axis which is not written here uses the point numbers below (its 3621 to 3622): "
         "--set first_number=... begins behind them.",
@@ -142,7 +142,9 @@ class FanucPitch(FileControl):
         words = [settings["sign"], settings["detection_unit_um"], settings["detection_unit_deg"], "".join(axes)]
         words += [f"{axis}{at!r}" for axis, at in places.items()]
         files[SETTINGS] = (" ".join(words) + "\n").encode()
-        notes.append("The way back needs a table of its own (3605#0); what is written is the mean of both ways.")
+        notes.append(
+            "The opposite direction needs its own table (3605#0); the values written are the mean of both directions."
+        )
         notes.append(f"{SETTINGS} is for ncfix emulate only; the control does not read it.")
         least = least_of_own_axis(request.machine, request.space, request.tool_length)
         return Written(files, tuple(notes), least)
@@ -182,8 +184,9 @@ def _unsaid(axis: str, correction: float) -> str:
     rotary = axis in TURNING
     size = f"{correction / DEGREE:.4g} degree" if rotary else f"{1000 * correction:.1f} um"
     return (
-        f"{axis}: no points. Increments count from the reference position, where the correction is {size}, and without "
-        f"that they take nothing off. A reference position that is shifted by it, and the axis measured again, help."
+        f"{axis}: no points are written. Increments count from the reference position, where the correction is "
+        f"{size}; without that part they correct nothing. Shift the reference position by this amount, and measure "
+        "the axis again."
     )
 
 
@@ -251,7 +254,7 @@ def _with_cells(
     first, last = (0, cells) if turn else _ends(low - at, high - at, interval)
     if last - first + 1 > MOST_POINTS:
         raise RefusedError.of(
-            "NCF484", f"{axis} needs {last - first + 1} points, and the control has {MOST_POINTS} for an axis"
+            "NCF484", f"{axis} needs {last - first + 1} points, but the control has {MOST_POINTS} for an axis"
         )
     places = (at + np.arange(first, last + 1) * interval) * described.unit
     lowest, highest = request.space[column]
@@ -293,4 +296,4 @@ def diffused(curve: Array) -> tuple[Ints, int]:
         magnification += 1
         if magnification > MOST_PITCH_MAGNIFICATION:
             text = f"a pitch error needs a magnification above {MOST_PITCH_MAGNIFICATION}"
-            raise RefusedError.of("NCF484", text, hint="is the error in mm?")
+            raise RefusedError.of("NCF484", text, hint="check that the error is in mm")

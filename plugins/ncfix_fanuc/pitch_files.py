@@ -143,7 +143,7 @@ def _pitch(remarks: Remarks, axis: str, axes: str, values: Mapping[int, Mapping[
         if total := increments[1:].sum():
             remarks.refuse(0, f"the increments of a turn behind its first point add up to {total}, not to zero")
         if increments[0] != increments[-1]:
-            text = f"point {first} has {increments[0]}, and point {last}, the same place, has {increments[-1]}"
+            text = f"point {first} has {increments[0]}, but point {last}, at the same position, has {increments[-1]}"
             remarks.doubt(0, text, "the same value for both")
     if remarks.wrong:
         return None
@@ -154,7 +154,7 @@ def _pitch(remarks: Remarks, axis: str, axes: str, values: Mapping[int, Mapping[
 def _check(remarks: Remarks, parameters: Mapping[str, float], first: int, last: int) -> None:
     if (parameters["low"], parameters["high"]) != (first, last):
         remarks.refuse(
-            0, f"points {first} to {last}, and the parameters say {parameters['low']:g} to {parameters['high']:g}"
+            0, f"points {first} to {last}, but the parameters state {parameters['low']:g} to {parameters['high']:g}"
         )
     if parameters["interval"] == 0:
         remarks.refuse(0, "an interval of zero")

@@ -180,9 +180,9 @@ def read_volc(files: Files) -> tuple[Volc | None, Remarks]:
         remarks.refuse(0, f"is not what ncfix writes: {type(error).__name__}: {error}")
         return None, remarks
     if volc is not None and files.get(VOLUME_CSV) != csv_text(volc):
-        remarks.refuse(0, f"{VOLUME_CSV} is missing or does not say the same")
+        remarks.refuse(0, f"{VOLUME_CSV} is missing or has other values")
     if volc is not None and files.get(VOLUME_TEXT) != (template_text(volc) if volc.style.template else None):
-        remarks.refuse(0, f"{VOLUME_TEXT} is missing, or there without a template, or does not say the same")
+        remarks.refuse(0, f"{VOLUME_TEXT} is missing, exists without a template, or has other values")
     return volc, remarks
 
 
@@ -212,7 +212,7 @@ def _volc(found: Any, remarks: Remarks) -> Volc | None:
     volc = Volc(found["sign"], low, step, unit, magnification, values, style, placing)
     for key, number in _placing(volc).items():
         if key == "reference_number" and found.get(key) != number:
-            remarks.refuse(0, f"{key} is {found.get(key)!r}, and by the numbers of the axes it is {number}")
+            remarks.refuse(0, f"{key} is {found.get(key)!r}, but must be {number} by the numbers of the axes")
             return None
     return volc
 
@@ -256,7 +256,7 @@ def _data(record: Mapping[str, Any], first: int, remarks: Remarks) -> list[int]:
     data = json_values.wholes(record, "data")
     size = len(data)
     if record["start_no"] != first or record["num"] != size or size > 3 * RECORD_POINTS:
-        remarks.refuse(0, f"the record of point {record['start_no']} has {size} values and says {record['num']}")
+        remarks.refuse(0, f"the record of point {record['start_no']} has {size} values, but states {record['num']}")
     if record["end_no"] != first + size // 3 - 1:
         remarks.refuse(0, f"the record of point {record['start_no']} ends at {record['end_no']}")
     return data
@@ -334,8 +334,13 @@ class Lattice:
         for grid, unit in zip(grids, units, strict=True):
             factors.append(max(1, math.ceil(float(np.abs(grid.values).max()) / (LARGEST_VALUE * unit) - 1e-9)))
             if factors[-1] > MOST_LATTICE_MAGNIFICATION:
-                text = f"a value needs a magnification of {factors[-1]}, and {MOST_LATTICE_MAGNIFICATION} is the most"
-                raise RefusedError.of("NCF484", text, hint="a larger detection unit, or is the error in mm and rad?")
+                text = (
+                    f"a value needs a magnification of {factors[-1]}, but at most {MOST_LATTICE_MAGNIFICATION} is "
+                    "possible"
+                )
+                raise RefusedError.of(
+                    "NCF484", text, hint="use a larger detection unit, or check that the errors are in mm and rad"
+                )
             whole.append(np.rint(sense_of(sign) * grid.values / (factors[-1] * unit)).astype(np.int64))
         inputs = grids[0].inputs
         lines = [line / unit_of(name) for name, line in zip(inputs, grids[0].nodes, strict=True)]

@@ -123,7 +123,7 @@ class FanucRotary(FileControl):
         position_frame="machine coordinates",
         unit="detection unit times magnification; positions mm",
         quantum=(1e-4, 1e-4 * DEGREE),
-        extrapolation="taken as held at the outermost nodes",
+        extrapolation="the value of the outermost node is assumed to hold",
         bidirectional=True,
         max_points=SIDE**3,
         max_tables=2,
@@ -180,7 +180,7 @@ class FanucRotary(FileControl):
         ),
     }
     steps = (
-        "Settle FROT-1 to FROT-5 on the machine.",
+        "Check FROT-1 to FROT-5 on the machine.",
         PLACING_STEP,
         "Set the magnifications as rotary.json, and rotary-axes.json if it is there, have them.",
         BACKLASH_STEP,
@@ -222,7 +222,7 @@ class FanucRotary(FileControl):
             found.append(read_lattice(TABLE_LATTICE_FILE, files[TABLE_LATTICE_FILE], linear=False))
         lattices = [lattice for lattice, _ in found if lattice is not None]
         if len({lattice.scale.sign for lattice in lattices}) > 1:
-            found[1][1].refuse(0, f"the sign is another one than that of {LATTICE_FILE}")
+            found[1][1].refuse(0, f"the sign differs from that of {LATTICE_FILE}")
         backlash, more = read_backlash(files, lattices[0].home_minus if lattices else "")
         remarks = [*(each for _, each in found), *more]
         if len(lattices) < len(found):
@@ -278,12 +278,12 @@ def _notes(
         )
         left = residual(request.machine, tables, request.space, request.tool_length).figures()["after"]
         kind = "L-VOL" if tables.table is None else "L-VOL and the position part of R-VOL"
-        yield f"{kind}: {left['max']:.2f} um at most are left, {left['rms']:.2f} rms."
+        yield f"{kind}: {left['max']:.2f} um at most remain, {left['rms']:.2f} um rms."
         if not mesh.reached:
             yield f"Its share of the target of {1e3 * request.target:g} um is not reached with the points allowed."
     seen = [axis for lattice, _ in lattices for axis in lattice.inputs]
     if others := unseen_axes(request.machine, request.space, request.tool_length, seen):
-        yield f"The lattice is that of {others} at zero; elsewhere more is left."
+        yield f"The lattice is exact with {others} at zero; at other angles the remaining error is larger."
     yield from more
     yield from reversal_note(request.machine, request.space, request.tool_length, play)
 

@@ -171,11 +171,11 @@ def over_limits(rows: Sequence[ChainRow]) -> Iterator[str]:
     coords = sum(row.coord is not None for row in rows)
     errors = sum(row.error is not None for row in rows)
     if chain > MAX_ROWS:
-        yield f"{chain} rows Trans and MachAxis, and the control takes {MAX_ROWS}"
+        yield f"{chain} rows Trans and MachAxis, but the control takes {MAX_ROWS}"
     if coords > MAX_COORDS:
-        yield f"{coords} entries under COORD, and the control takes {MAX_COORDS}"
+        yield f"{coords} entries under COORD, but the control takes {MAX_COORDS}"
     if errors > MAX_ERRORS - axes:
-        yield f"{errors} entries under COMPTAB, and the control takes {MAX_ERRORS - axes} with {axes} axes"
+        yield f"{errors} entries under COMPTAB, but the control takes {MAX_ERRORS - axes} with {axes} axes"
 
 
 def read_rows(remarks: Remarks, content: bytes) -> tuple[ChainRow, ...]:
@@ -198,17 +198,17 @@ def read_rows(remarks: Remarks, content: bytes) -> tuple[ChainRow, ...]:
         remarks.refuse(0, "exactly one row MachBase is needed")
     moved = [row.axis for row in rows if row.key == "MachAxis"]
     if len(set(moved)) != len(moved):
-        remarks.refuse(0, "an axis is there twice")
+        remarks.refuse(0, "an axis appears twice")
     return rows
 
 
 def _row(remarks: Remarks, expected: int, line: int, nr: str, key: str, axis: str, coord: str, error: str) -> ChainRow:
     if nr != str(expected):
-        remarks.refuse(line, f"row {nr or 'without a number'} where {expected} should be")
+        remarks.refuse(line, f"row {nr or 'without a number'} instead of row {expected}")
     if key not in KEYS:
-        remarks.refuse(line, f"{key!r} is no key", ", ".join(KEYS))
+        remarks.refuse(line, f"{key!r} is not a key", ", ".join(KEYS))
     if key != "MachBase" and (len(axis) != 1 or axis not in LETTERS):
-        remarks.refuse(line, f"{axis!r} is no axis")
+        remarks.refuse(line, f"{axis!r} is not an axis")
         axis = "X"
     if key != "Trans" and (coord or error):
         remarks.refuse(line, f"{key} takes neither COORD nor COMPTAB")

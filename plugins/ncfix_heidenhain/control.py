@@ -45,7 +45,7 @@ class Heidenhain(FileControl):
         position_frame="machine datum (MP_refPosition)",
         unit="mm, degree",
         quantum=(1e-4, 1e-4 * DEGREE),
-        extrapolation="taken as held at the first and last row (HEID-2)",
+        extrapolation="the value of the first and last row is assumed to hold (HEID-2)",
         bidirectional=True,
         max_points=MAX_ROWS,
         max_tables=len(ORDER),
@@ -69,7 +69,8 @@ class Heidenhain(FileControl):
         ),
         Assumption(
             "HEID-3",
-            "BACKLASH is what counts for the axis itself instead of its own column while it travels towards minus.",
+            "While the axis travels towards minus, the column BACKLASH counts for the axis itself instead of its own "
+            "column.",
             "MANUALplus 620 technical manual: values measured in negative travel",
             "the column is left out, or (itnc530) repeats the axis's own; --set backlash=on writes it",
             "Load 0.000 in the axis column and 0.010 in BACKLASH, and read a dial gauge from both sides.",
@@ -91,7 +92,7 @@ class Heidenhain(FileControl):
     )
     options: ClassVar[Mapping[str, Option]] = {
         "sign": Option(
-            None, "error: values are taken off the command; correction: they are added", one_of(*SIGNS), "HEID-1"
+            None, "error: values are subtracted from the command; correction: they are added", one_of(*SIGNS), "HEID-1"
         ),
         "family": Option(
             "tnc640", "tnc640: NCK controls; itnc530: datum and distance in the first line", one_of("tnc640", "itnc530")
@@ -100,7 +101,7 @@ class Heidenhain(FileControl):
         "points": Option(str(MAX_ROWS), f"most rows of a file, at most {MAX_ROWS}", whole(2, MAX_ROWS)),
     }
     steps = (
-        "Settle HEID-1 on the machine.",
+        "Check HEID-1 on the machine.",
         "Save the present .COM and .CMA files; they are machine data behind the code number, so that the machine's "
         "maker or the service must load new ones.",
         "Load the .COM files, then config.cma; if there are lines of your own in it, add the columns to the active "
@@ -128,8 +129,8 @@ class Heidenhain(FileControl):
             com = _as_file(line, sense, axes if old else None, both)
             largest = max(float(np.abs(values).max()) for values in com.columns.values())
             if largest > MAX_CELL:
-                text = f"{tables[line.input]} would have to hold {largest:.3f}, and its columns end at {MAX_CELL}"
-                raise RefusedError.of("NCF484", text, hint="is the error in mm?")
+                text = f"{tables[line.input]} would have to hold {largest:.3f}, but its columns hold at most {MAX_CELL}"
+                raise RefusedError.of("NCF484", text, hint="check that the error is in mm")
             as_text = old_text if old else nck_text
             files[tables[line.input]] = as_text(tables[line.input], com, 4)
         files[CONFIG] = cma_text(axes, tables)
@@ -144,7 +145,7 @@ class Heidenhain(FileControl):
         remarks, terms = [config], []
         sign = files.get(SIGN, b"").decode("latin-1").strip()
         if sign not in SIGNS:
-            config.refuse(0, f"{SIGN} says {sign!r}", "error or correction; HEID-1 says how to find out")
+            config.refuse(0, f"{SIGN} says {sign!r}", "give error or correction; HEID-1 describes how to find out")
         sense = sign_of(sign)
         for axis, name in tables.items():
             com, found = read_com(name, files[name])
@@ -179,8 +180,8 @@ def _terms(axis: str, com: ComTable, axes: tuple[str, ...], sense: float, remark
         scale = sense * unit_of(output)
         if output == axis and com.backlash is not None:
             if values.any() and not com.backlash.any():
-                text = f"BACKLASH is zero in all rows: {axis} would not be corrected while it travels towards minus"
-                remarks.doubt(0, text, "the values of its own column, if there is no play (HEID-3)")
+                text = f"BACKLASH is zero in all rows, so {axis} would not be corrected while it travels towards minus"
+                remarks.doubt(0, text, "without play, enter the values of its own column (HEID-3)")
             yield from own_terms(axis, nodes, scale * values, scale * com.backlash)
         else:
             yield Term((Grid((axis,), (nodes,), (output,), scale * values[:, None]),))
@@ -238,13 +239,16 @@ def play_left(request: Request, done: Compensation, both: bool) -> Iterator[str]
     yield from left
     own = (each for each in machine.effects if each.basis.needs_direction and each.joint == each.name[1])
     if left and not both and any(each.active for each in own):
-        yield "The mean of both ways is written; --set backlash=on writes what the way back needs."
+        yield (
+            "The values written are the mean of both directions; --set backlash=on also writes those for the "
+            "direction towards minus."
+        )
 
 
 def _notes(lines: tuple[AxisTables, ...], most: int) -> tuple[str, ...]:
     notes = [
-        "A sum of tables over one axis each cannot follow angular errors, whose lever changes as another axis moves: "
-        "that part of the error is left, unless the control has KinematicsComp (heidenhain-kinematics)."
+        "A sum of tables over one axis each cannot follow angular errors, whose lever changes as another axis moves. "
+        "That part of the error remains, unless the control has KinematicsComp (heidenhain-kinematics)."
     ]
     notes.append("sign.txt is for ncfix emulate only; the control does not read it.")
     full = [line.input for line in lines if len(line.nodes) >= most > 2]

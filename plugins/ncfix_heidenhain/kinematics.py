@@ -48,7 +48,7 @@ class KinematicsComp(FileControl):
         position_frame="machine datum",
         unit="mm, degree; angles under C4 to C6 and COMPTAB as --set angle_unit says",
         quantum=(1e-7, 1e-7),
-        extrapolation="taken as held at the first and last row",
+        extrapolation="the value of the first and last row is assumed to hold",
         bidirectional=True,
         max_points=MAX_ROWS,
         max_tables=18,
@@ -87,7 +87,8 @@ class KinematicsComp(FileControl):
         ),
         Assumption(
             "KINE-5",
-            "BACKLASH is what counts for the axis itself instead of its own column while it travels towards minus.",
+            "While the axis travels towards minus, the column BACKLASH counts for the axis itself instead of its own "
+            "column.",
             "MANUALplus 620 technical manual: values measured in negative travel (see HEID-3)",
             "it repeats the own column; --set backlash=on writes what play changes",
             "Load 0.000 in the axis column and 0.010 in BACKLASH, and read a dial gauge from both sides.",
@@ -95,7 +96,7 @@ class KinematicsComp(FileControl):
     )
     options: ClassVar[Mapping[str, Option]] = {
         "sign": Option(
-            None, "error: entries say how the machine is wrong; correction: the opposite", one_of(*SIGNS), "KINE-2"
+            None, "error: entries are the errors of the machine; correction: the opposite", one_of(*SIGNS), "KINE-2"
         ),
         "angle_unit": Option(None, "deg or rad", one_of(*ANGLES), "KINE-3"),
         "backlash": Option(
@@ -106,7 +107,7 @@ class KinematicsComp(FileControl):
         "points": Option(str(MAX_ROWS), f"most rows of an axis table, at most {MAX_ROWS}", whole(2, MAX_ROWS)),
     }
     steps = (
-        "Settle KINE-1 to KINE-3 on the machine.",
+        "Check KINE-1 to KINE-3 on the machine.",
         "Have the machine's maker or the service enter the COMPTAB column in the kinematics table of the machine, "
         "with the rows that only errors need; do not replace it by the one written here.",
         "Load the .COM files and config.cma.",
@@ -133,7 +134,7 @@ class KinematicsComp(FileControl):
             com = _com(each, axes, sense, angle)
             if any(np.abs(values).max() > MAX_CREDIBLE for values in com.columns.values()):
                 text = f"an error of {each.axis} beyond {MAX_CREDIBLE} mm or degree"
-                raise RefusedError.of("NCF484", text, hint="is the error in mm and rad?")
+                raise RefusedError.of("NCF484", text, hint="check that the errors are in mm and rad")
             if com.columns:
                 tables[each.axis] = f"AXIS-{each.axis}.COM"
                 files[tables[each.axis]] = old_text(tables[each.axis], com, 7)
@@ -183,8 +184,8 @@ class KinematicsComp(FileControl):
 def _axes(machine: Machine) -> tuple[str, ...]:
     found = in_order(machine, LETTERS)
     if not {"X", "Y", "Z"} <= set(found):
-        text = f"the chain needs X, Y and Z; the machine has {' '.join(found)}"
-        raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
+        text = f"the kinematics table needs X, Y and Z; the machine has {' '.join(found)}"
+        raise RefusedError.of("NCF484", text, hint="correct the programs instead: ncfix fix")
     return found
 
 
@@ -240,7 +241,9 @@ def _check_names(chain: tuple[ChainRow, ...], components: Mapping[tuple[str, str
 def _read_units(files: Files, remarks: Remarks) -> tuple[float, float]:
     words = files.get(UNITS, b"").decode("latin-1").split()
     if len(words) != 2 or words[0] not in ("error", "correction") or words[1] not in ANGLES:
-        remarks.refuse(0, f"{UNITS} says {' '.join(words)!r}", "error or correction, deg or rad; see KINE-2, KINE-3")
+        remarks.refuse(
+            0, f"{UNITS} says {' '.join(words)!r}", "give error or correction, and deg or rad; see KINE-2, KINE-3"
+        )
         return 1.0, 1.0
     return 1.0 if words[0] == "error" else -1.0, ANGLES[words[1]]
 
@@ -250,7 +253,9 @@ def _notes(components: list[AxisErrors], depends: list[bool], most: int) -> list
     notes.append("units.txt is for ncfix emulate only; the control does not read it.")
     some = [each.axis for each, flag in zip(components, depends, strict=True) if flag]
     if some:
-        notes.append(f"Errors of {', '.join(some)} depend on more than the position of the axis: the mean is written.")
+        notes.append(
+            f"Errors of {', '.join(some)} depend on more than the position of the axis; their mean is written."
+        )
     full = [each.axis for each in components if len(each.nodes) >= most]
     if full:
         notes.append(f"With {most} rows the target is not reached along {', '.join(full)}.")

@@ -125,9 +125,9 @@ def _cells(remarks: Remarks, cell_number: int, line: str, columns: Sequence[Tabl
         stop = start + column.width if index + 1 < len(columns) else len(line)
         cell = line[start:stop]
         if index + 1 < len(columns) and len(cell) == column.width and not cell.endswith(" ") and cell.strip():
-            remarks.refuse(cell_number, f"what stands under {column.name} runs into the next column")
+            remarks.refuse(cell_number, f"the value under {column.name} extends into the next column")
         if cell.startswith(" ") and cell.strip():
-            remarks.doubt(cell_number, f"what stands under {column.name} does not begin where the column does")
+            remarks.doubt(cell_number, f"the value under {column.name} does not begin where the column begins")
         cells.append(cell.strip())
         start = stop
     if len(cells[-1].split()) > 1:
@@ -140,7 +140,7 @@ def cell_number(remarks: Remarks, line: int, cell: str, name: str) -> float:
     found = as_number(cell)
     if found is not None:
         return found
-    what = "a decimal comma" if "," in cell else f"{cell!r} is no number" if cell else "nothing"
+    what = "a decimal comma" if "," in cell else f"{cell!r} is not a number" if cell else "nothing"
     remarks.refuse(line, f"{what} under {name}")
     return float("nan")
 
@@ -167,7 +167,7 @@ def read_cma(files: Files) -> tuple[tuple[str, ...], dict[str, str], Remarks]:
     axes = tuple(column.name for column in table.columns if column.name not in ("NR", ACTIVE))
     for axis in axes:
         if len(axis) != 1 or axis not in ORDER or axes.count(axis) > 1:
-            remarks.refuse(0, f"the column {axis} is no axis, or is there twice")
+            remarks.refuse(0, f"the column {axis} is not an axis, or appears twice")
     marked = [row for row, cell in enumerate(table.cells(ACTIVE)) if cell == "*"]
     if len(marked) != 1:
         remarks.refuse(0, f"{len(marked)} lines are marked with *", "exactly one line is active")
@@ -228,14 +228,14 @@ def read_com(path: str, content: bytes) -> tuple[ComTable | None, Remarks]:
     names = [column.name for column in table.columns]
     numbered = enumerate(zip(table.lines, table.cells("NR"), strict=True))
     for expected, line, cell in [(n, line, cell) for n, (line, cell) in numbered if cell != str(n)][:1]:
-        remarks.refuse(line, f"row {cell or 'without a number'} where {expected} should be")
+        remarks.refuse(line, f"row {cell or 'without a number'} instead of row {expected}")
     nodes = _positions(remarks, table, path)
     held = [name for name in names if name not in ("NR", POSITION, BACKLASH)]
     for name in held:
         if not (FUNCTION.fullmatch(name) or COMPONENT.fullmatch(name) or (len(name) == 1 and name in "XYZABCUVW")):
-            remarks.refuse(0, f"the column {name} is no axis", "letters of axes, 1=F(), or C1 to C6")
+            remarks.refuse(0, f"the column {name} is not an axis", "letters of axes, 1=F(), or C1 to C6")
         if names.count(name) > 1:
-            remarks.refuse(0, f"the column {name} is there twice")
+            remarks.refuse(0, f"the column {name} appears twice")
     if not held:
         remarks.refuse(0, "no column of values")
     short = {name: match[1] if (match := FUNCTION.fullmatch(name)) else name for name in held}
@@ -267,7 +267,7 @@ def _positions(remarks: Remarks, table: TextTable, path: str) -> Array:
     if not match:
         remarks.refuse(1, "BEGIN should be followed by NAME MM, or NAME DATUM:... DISTANCE:...")
     elif match[1].upper() != path.upper():
-        remarks.doubt(1, f"says that it is {match[1]}")
+        remarks.doubt(1, f"has the name {match[1]} inside")
     for row in np.flatnonzero(np.diff(nodes) <= 0):
         remarks.refuse(table.lines[row + 1], "the positions must ascend")
     return nodes
@@ -282,9 +282,13 @@ def _look(remarks: Remarks, table: TextTable, nodes: Array, columns: Mapping[str
     """Remark on values that are too large, and on values that change faster than the error of any axis does."""
     for name, values in columns.items():
         for row in np.flatnonzero(np.abs(values) > MAX_CREDIBLE)[:1]:
-            remarks.refuse(table.lines[row], f"{values[row]:g} under {name}, which no machine needs", "mm, not um")
+            remarks.refuse(
+                table.lines[row],
+                f"{values[row]:g} under {name}, which is larger than any machine needs",
+                "values are in mm, not um",
+            )
         slopes = np.abs(np.diff(values)) / np.diff(nodes)
         for row in np.flatnonzero(slopes > MAX_SLOPE)[:1]:
             slope, limit = f"{slopes[row]:.3g}", f"{MAX_SLOPE:.3g}"
             text = f"{name} changes by {slope} per unit from the row before; older controls allow {limit}"
-            remarks.doubt(table.lines[row + 1], text, "a slip of the digits?")
+            remarks.doubt(table.lines[row + 1], text, "check this value for a typing error")

@@ -79,7 +79,7 @@ class Isg(FileControl):
         position_frame="machine coordinates",
         unit="values mm, positions mm and degree",
         quantum=(1e-6, 1e-6),
-        extrapolation="taken as held at the outermost nodes (ISG-2)",
+        extrapolation="the value of the outermost node is assumed to hold (ISG-2)",
         bidirectional=True,
         max_points=MOST_NODES,
         max_tables=50,

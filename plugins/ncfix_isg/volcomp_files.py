@@ -133,7 +133,7 @@ def _entries(
         elif words:
             name = spelt(words[0])
             if name in found:
-                remarks.refuse(number, f"{name} is there twice")
+                remarks.refuse(number, f"{name} appears twice")
             if not known(name):
                 remarks.refuse(number, f"the name {name!r} is not known (error 70468)")
             found[name] = (number, words[1].strip())
@@ -296,7 +296,7 @@ def _header(
             remarks.refuse(line, f"{word}: ncfix runs position errors only, not angles and locations")
     for word in head:
         if list(head).count(word) > 1 or (word in outputs and word in seen):
-            remarks.refuse(line, f"{word} is there twice (error 70469)")
+            remarks.refuse(line, f"{word} appears twice (error 70469)")
             break
     seen.update(dict.fromkeys(outputs, remarks.path))
     return inputs, outputs

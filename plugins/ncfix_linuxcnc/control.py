@@ -378,6 +378,6 @@ def _coordinates(request: Request, given: str) -> str:
 
 def _notes() -> tuple[str, ...]:
     return (
-        "Straightness, squareness, angles and where the rotary axes lie cannot be said in one-axis tables: that part "
-        "of the error is left. ncfix fix corrects it in the program.",
+        "One-axis tables cannot hold straightness, squareness, angular errors and the location of rotary axes. That "
+        "part of the error remains; ncfix fix corrects it in the program.",
     )

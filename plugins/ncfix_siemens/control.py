@@ -68,7 +68,7 @@ class Siemens(FileControl):
             yield self._wanting(f"where tables are multiplied: {OPTIONS['product_terms'].text}")
 
     def _wanting(self, why: str) -> Message:
-        text = f"siemens needs the option 'product_terms' {why}"
+        text = f"siemens needs the setting 'product_terms' {why}"
         return Message("NCF485", text, hint=f"--set product_terms=VALUE{self._how(OPTIONS['product_terms'])}")
 
     def write(self, request: Request) -> Written:
@@ -82,8 +82,8 @@ class Siemens(FileControl):
         reading = TableReading(settings.axes, 1 if settings.sign == "correction" else -1, settings.terms)
         cec = tables_of(others, reading)
         if len(cec) > settings.limits.tables:
-            text = f"{len(cec)} tables are needed, and {settings.model} has {settings.limits.tables}"
-            hint = "--set tables=N if yours has more; product_terms=only needs least"
+            text = f"{len(cec)} tables are needed, but {settings.model} has {settings.limits.tables}"
+            hint = "give --set tables=N if your control has more; product_terms=only needs the fewest tables"
             raise RefusedError.of("NCF484", text, hint=hint)
         eec = [replace(table, index=0) for table in tables_of(own, TableReading(settings.axes, -1, ""))]
         files = {f"{table.output}_EEC.INI": eec_text(table, _heads(settings)) for table in eec}
@@ -91,7 +91,7 @@ class Siemens(FileControl):
             files[CEC] = cec_text(cec, _heads(settings), _titles(cec, settings), settings.style)
         rotary = {axis.name for axis in request.machine.axes if axis.rotary}
         turned = any(term.outputs[0] in rotary for term in scheme.tables.terms)
-        why = "a weighting of the correction that no function of two axes sees has so much of it"
+        why = "a part of the correction of this size cannot be written as a sum of functions of two axes"
         least = Least(scheme.bound, why + (", with the rotary axes corrected as here" if turned else ""))
         return Written(files, tuple(_notes(request, settings, scheme, cec)), least)
 
@@ -183,9 +183,12 @@ def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[C
     products = sum(bool(table.multiply) for table in cec)
     yield f"Scheme {settings.scheme}: {len(cec)} tables of {settings.limits.tables}, {products} of them multiplied."
     if scheme.rest > request.target / 10:
-        yield f"{1e3 * scheme.rest:.2f} um rms of the correction take three axes at once and are left."
+        yield f"{1e3 * scheme.rest:.2f} um rms of the correction depend on three axes at once and remain."
     if scheme.dropped > request.target / 10:
-        yield f"{1e3 * scheme.dropped:.2f} um rms were left out: the tables for them are not there, or not worth it."
+        yield (
+            f"{1e3 * scheme.dropped:.2f} um rms of the correction were left out: the control has no tables for them, "
+            "or they are too small."
+        )
     yield from _turned(request, scheme)
     if cec:
         yield f"MD18342[0...]: {' '.join(str(len(table.values)) for table in cec)} points."
@@ -206,7 +209,7 @@ def _turned(request: Request, scheme: Scheme) -> Iterator[str]:
     before, after = (orientation_error(request.machine, q, each, state) for each in (np.zeros_like(q), done))
     sizes = [1e6 * float(np.sqrt(np.mean(angle**2))) for angle in (before, after)]
     if not done[:, request.machine.rotary].any():
-        yield "The rotary axes keep their values: that leaves less at the tip, or it was asked for."
+        yield "The rotary axes keep their values: then the error at the tip is smaller, or the setting asks for it."
     yield f"Orientation of the tool, spin included: {sizes[0]:.1f} urad rms without tables, {sizes[1]:.1f} with them."
 
 

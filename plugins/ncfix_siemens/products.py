@@ -166,14 +166,16 @@ def _look_across(folder: Folder, remarks: Remarks) -> None:
     for key, count in (("tables", len(folder.cec)), ("points", max((len(t.values) for t in folder.cec), default=0))):
         most = folder.said.get(f"most_{key}", "")
         if most.isdecimal() and count > int(most):
-            remarks.refuse(0, f"{count} {key}, and the control has {most}", "a smaller range, fewer tables, or fix")
+            remarks.refuse(
+                0, f"{count} {key}, but the control has {most}", "use a smaller range, fewer tables, or ncfix fix"
+            )
     ways: dict[tuple[str, str, int], set[int]] = {}
     for table in folder.cec:
         ways.setdefault((table.input, table.output, table.multiply), set()).add(table.direction)
     for (source, output, _), found in ways.items():
         if found in ({1}, {-1}):
-            text = f"{output} is corrected over {source} while it moves one way only"
-            remarks.doubt(0, text, "a table for the other way is missing?")
+            text = f"{output} is corrected over {source} only while it moves in one direction"
+            remarks.doubt(0, text, "check whether the table for the other direction is missing")
 
 
 def reading_of(folder: Folder) -> tuple[TableReading | None, Remarks]:
@@ -182,12 +184,12 @@ def reading_of(folder: Folder) -> tuple[TableReading | None, Remarks]:
     axes = {key: value for key, value in folder.said.items() if len(key) == 1}
     used = {name for table in (*folder.cec, *folder.eec) for name in (table.input, table.output)}
     for name in sorted(used - set(axes.values())):
-        remarks.refuse(0, f"no file says which axis of the machine {name} is", UNSAID)
+        remarks.refuse(0, f"no file states which axis of the machine {name} is", UNSAID)
     sign, terms = folder.said.get("value_sign", ""), folder.said.get("product_terms", "")
     if folder.cec and sign not in SIGNS:
-        remarks.refuse(0, "no file says whether values are errors or corrections (value_sign)", UNSAID)
+        remarks.refuse(0, "no file states whether values are errors or corrections (value_sign)", UNSAID)
     if any(table.multiply for table in folder.cec) and terms not in TERMS:
-        remarks.refuse(0, "no file says what a product adds (product_terms)", UNSAID)
+        remarks.refuse(0, "no file states what a product adds (product_terms)", UNSAID)
     if remarks.wrong:
         return None, remarks
     return TableReading(axes, 1 if sign == "correction" else -1, terms), remarks

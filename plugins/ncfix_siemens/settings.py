@@ -84,10 +84,10 @@ ASSUMPTIONS = (
 )
 STEPS = (
     "Back up the control: changing MD18342 formats the static user memory.",
-    "Settle the assumptions below on the machine, sign and products first (ncfix export siemens --probe).",
+    "Check the assumptions below on the machine, sign and products first (ncfix export siemens --probe).",
     "MD18342 $MN_MM_CEC_MAX_POINTS[t] (EEC: MD38000 $MA_MM_ENC_COMP_MAX_POINTS) at least as in the remarks; NCK reset.",
     "MD32710 $MA_CEC_ENABLE = 0 (EEC: MD32700 $MA_ENC_COMP_ENABLE = 0) for all axes.",
-    "MD32720 $MA_CEC_MAX_SUM as in the remarks: it stops the worst if an assumption is wrong.",
+    "MD32720 $MA_CEC_MAX_SUM as in the remarks: it limits the damage if an assumption is wrong.",
     "Run the files as part programs, or load them as archives.",
     "SD41300 $SN_CEC_TABLE_ENABLE[t] = 1 for every table, MD32710 = 1 (EEC: MD32700 = 1); NCK reset.",
     "Reference all axes: only then tables act. The display of machine coordinates does not show them.",
@@ -109,22 +109,22 @@ AXIS_NAME = re.compile(r"\w{1,16}", re.ASCII)
 YES_NO = one_of("yes", "no")
 OPTIONS: Mapping[str, Option] = {
     "value_sign": Option(
-        None, "error: values are taken off commands; correction: they are added", one_of(*SIGNS), "SIEMENS-1"
+        None, "error: values are subtracted from the command; correction: they are added", one_of(*SIGNS), "SIEMENS-1"
     ),
     "product_terms": Option(
         "", "what a product adds: only, plus_multiplier, plus_base, plus_both", one_of(*TERMS), "SIEMENS-2"
     ),
     "scheme": Option("auto", "auto, or the thesis's poly25, trigo23, fik40, fik20", one_of(*SCHEMES)),
     "model": Option("840D", "840D (40 tables of 1000 points), 828D (8 of 200), 802D (2 of 350)", one_of(*MODELS)),
-    "tables": Option("", "most tables, if not those of the model", whole(1, MOST_TABLES)),
-    "points": Option("", "most points of a table, if not those of the model", whole(3, MOST_POINTS)),
+    "tables": Option("", "number of tables, if not that of the model", whole(1, MOST_TABLES)),
+    "points": Option("", "number of points of a table, if not that of the model", whole(3, MOST_POINTS)),
     "rotary": Option(
         "auto",
-        "correct the rotary axes, too: correct, keep, or auto: unless the tip is better without",
+        "rotary axes: correct, keep, or auto (correct them unless the tip error is smaller without)",
         one_of("auto", "correct", "keep"),
     ),
     "positioning": Option(
-        "cec", "where an axis over itself goes: cec, or eec, the encoder tables", one_of("cec", "eec")
+        "cec", "where the tables of an axis over itself are written: cec, or eec (encoder tables)", one_of("cec", "eec")
     ),
     "axes": Option("", "machine axes, e.g. X:AX1,Y:AX2,Z:AX3,A:AX4,C:AX5"),
     "brackets": Option("yes", "axis names in brackets, (AX1), as in the manuals", YES_NO),

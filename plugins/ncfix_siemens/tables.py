@@ -175,16 +175,22 @@ def _look_at_products(tables: Iterable[CecTable], found: Mapping[int, Assigned],
 
 def _look_at_pair(table: CecTable, other: CecTable | None, line: int, remarks: Remarks) -> None:
     if other is None:
-        text = f"table {table.index + 1} is multiplied by table {table.multiply}, which is not there"
+        text = f"table {table.index + 1} is multiplied by table {table.multiply}, which does not exist"
         remarks.refuse(line, text, "the number of a table is its index + 1")
         return
     if other.output != table.output:
         text = f"table {table.index + 1} is for {table.output}, the table that it is multiplied by for {other.output}"
         remarks.refuse(line, text, "both factors have the same output axis")
     if other.direction != BOTH_WAYS:
-        remarks.refuse(line, f"table {table.multiply} multiplies others and acts one way only: what then is not public")
+        remarks.refuse(
+            line,
+            f"table {table.multiply} multiplies others and acts in one direction only; what the "
+            "control does then is not published",
+        )
     if other.multiply:
-        remarks.doubt(line, f"table {table.multiply} is itself multiplied by another: what then is not public")
+        remarks.doubt(
+            line, f"table {table.multiply} is itself multiplied by another; what the control does then is not published"
+        )
     if other is not table and -other.values.min() > CLEARLY * other.values.max():
         remarks.doubt(line, f"the largest value of the multiplier, table {table.multiply}, is negative", FLIPPED)
 
@@ -193,13 +199,13 @@ def _look_at_sizes(table: CecTable, found: Assigned, remarks: Remarks) -> None:
     """Note implausibly large values and jumps in a table that is added."""
     largest = int(np.argmax(np.abs(table.values)))
     if abs(table.values[largest]) > LARGE:
-        text = f"a value of {table.values[largest]:g}, which no machine needs"
+        text = f"a value of {table.values[largest]:g}, which is larger than any machine needs"
         remarks.doubt(found.values[largest].line, text, "values are in mm and degree, not um")
     slopes = np.abs(np.diff(table.values)) / table.step
     place = int(np.argmax(slopes))
     if slopes[place] > STEEP:
         text = f"the value changes by {slopes[place]:.3g} per unit of length from the one before"
-        remarks.doubt(found.values[place + 1].line, text, "a slip of the digits?")
+        remarks.doubt(found.values[place + 1].line, text, "check this value for a typing error")
 
 
 def eec_text(table: CecTable, heads: Iterable[str]) -> bytes:

@@ -26,16 +26,16 @@ from ncfix.outputs import check_folder, check_output, check_own, check_target, e
 from ncfix.values import frozen
 
 READING = {
-    errno.EACCES: "get the right to read it",
-    errno.EISDIR: "name a file, not a folder",
+    errno.EACCES: "get permission to read it",
+    errno.EISDIR: "give a file, not a folder",
     errno.ENXIO: "give an ordinary file, or - for standard input",
-    errno.EFBIG: "no file of this kind is so long; a long program can be given as a file",
+    errno.EFBIG: "files of this kind are never so long; give a long program as a file, not through a pipe",
 }
 WRITING = {
-    errno.EACCES: "another -o, or the right to write there",
+    errno.EACCES: "give another -o, or get permission to write there",
     errno.EROFS: "another -o",
-    errno.ENAMETOOLONG: "a shorter name",
-    errno.ENOTDIR: "another -o: a part of this path is a file",
+    errno.ENAMETOOLONG: "give a shorter name",
+    errno.ENOTDIR: "give another -o: a part of this path is a file",
 }
 """Hints by error number of the system."""
 COPIED = 1 << 20
@@ -109,12 +109,12 @@ def reading_hint(path: str, error: OSError) -> str:
         with suppress(OSError), os.scandir(folder or ".") as entries:
             if close := get_close_matches(name, [entry.name for entry in islice(entries, COMPARED)], 1):
                 return f"did you mean {os.path.join(folder, close[0])}?"
-    return READING.get(error.errno or 0, "give an existing file's path")
+    return READING.get(error.errno or 0, "give the path of an existing file")
 
 
 def unwritable(path: str, error: OSError) -> UsageError:
     """The error NCF007 for an output that the system cannot write."""
-    hint = WRITING.get(error.errno or 0, "make room, or another -o")
+    hint = WRITING.get(error.errno or 0, "make room, or give another -o")
     return UsageError.of("NCF007", f"cannot be written: {error.strerror}", Place(path), hint)
 
 

@@ -116,8 +116,8 @@ def each_once(given: Iterable[str], shown: Callable[[str], str] = str) -> None:
 
 def given_twice(path: str) -> UsageError:
     """The error NCF020 for an input that is given twice and would count twice."""
-    text = "is given twice, and what it says would count twice"
-    return UsageError.of("NCF020", text, Place(path), "leave it out once")
+    text = "is given twice, and would count twice"
+    return UsageError.of("NCF020", text, Place(path), "give it once")
 
 
 def _size(handle: IO[bytes]) -> int | None:
@@ -159,5 +159,5 @@ def _pipe(path: str) -> int:
         raise result
     if late:
         os.close(result)
-        raise OSError(errno.ENXIO, "it is a pipe, and nobody writes into it")
+        raise OSError(errno.ENXIO, "it is a pipe without a writer")
     return result

@@ -40,8 +40,8 @@ def check_target(
     check_named(path)
     check_output(path, root, replace)
     if identity(path) in inputs:
-        hint = "another output; ncfix fix has --in-place, too"
-        raise UsageError.of("NCF005", "is an input too, and inputs are not changed", Place(path), hint)
+        hint = "give another output; ncfix fix also has --in-place"
+        raise UsageError.of("NCF005", "is also an input, and inputs are not changed", Place(path), hint)
     if os.path.lexists(path) and not (replace or resume):
         raise exists_already(path)
     folder = os.path.dirname(path) or "."
@@ -51,7 +51,7 @@ def check_target(
 
 def exists_already(path: str) -> UsageError:
     """The error NCF004: the output exists already."""
-    return UsageError.of("NCF004", "exists already", Place(path), "--force replaces an output")
+    return UsageError.of("NCF004", "exists already", Place(path), "choose another output, or replace it with --force")
 
 
 def check_name(way: str, path: str) -> None:
@@ -75,7 +75,7 @@ def check_ordinary(path: str) -> None:
     """Refuse an existing output that is a symbolic link, a folder or a device: NCF005."""
     if os.path.islink(path):
         hint = f"name the file itself: {os.path.realpath(path)}"
-        raise UsageError.of("NCF005", "is a symbolic link, which is not written through", Place(path), hint)
+        raise UsageError.of("NCF005", "is a symbolic link; ncfix does not write through links", Place(path), hint)
     if os.path.lexists(path) and not os.path.isfile(path):
         raise UsageError.of("NCF005", "is not an ordinary file", Place(path), "-o - writes to standard output")
 
@@ -120,7 +120,7 @@ def check_own(path: str) -> None:
     check_ordinary(path)
     with suppress(FileNotFoundError):
         if os.stat(path).st_nlink != 1:
-            raise UsageError.of("NCF005", "is another file, too: it has two names", Place(path), "remove this one")
+            raise UsageError.of("NCF005", "has a second name (a hard link)", Place(path), "remove this name")
 
 
 def way_to(path: str, root: str | None) -> tuple[str, str]:
@@ -132,14 +132,14 @@ def way_to(path: str, root: str | None) -> tuple[str, str]:
 
 def linked(path: str) -> UsageError:
     """The error NCF005 for a symbolic link among the folders below the output folder."""
-    hint = "take the link away, or another -o"
+    hint = "remove the link, or give another -o"
     return UsageError.of("NCF005", "is a symbolic link, and leads out of the output folder", Place(path), hint)
 
 
 def _name_problem(name: str) -> str:
     """What is wrong with a name, in words; empty if nothing is."""
     if name in ("", os.curdir):
-        return "has an empty name in it"
+        return "contains an empty name"
     if name == os.pardir:
         return "leads out of the output folder: it has .. in it"
     if odd := next((char for char in name if unicodedata.category(char) == "Cc"), ""):
@@ -147,7 +147,7 @@ def _name_problem(name: str) -> str:
     if odd := next((char for char in "\\:" if char in name), ""):
         return f"has a {odd} in its name, which is a path on Windows"
     if name[-1] in ". ":
-        return f"ends in a {'full stop' if name[-1] == '.' else 'blank'}, which Windows leaves out"
+        return f"ends in a {'full stop' if name[-1] == '.' else 'blank'}, which Windows drops"
     stem = name.split(".", 1)[0].rstrip(" ")
     if DEVICE.fullmatch(stem):
         return f"{stem} is the name of a device on Windows, whatever its suffix"

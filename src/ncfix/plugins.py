@@ -111,7 +111,7 @@ def lacking(kind: str, thing: Any) -> str:
             "" if hasattr(thing, "effects") or hasattr(thing, "candidates") else "it has no effects and no candidates"
         )
     if kind == "bases" and not isinstance(thing, type):
-        return "it is no class"
+        return "it is not a class"
     if kind not in NEEDS:
         return "" if callable(thing) else "it cannot be called"
     abstract = getattr(thing, "__abstractmethods__", ()) if kind == "bases" else ()
@@ -120,7 +120,7 @@ def lacking(kind: str, thing: Any) -> str:
         return f"it has no {', '.join(absent)}"
     if kind == "bases":
         if not is_dataclass(thing):
-            return "it is no dataclass"
+            return "it is not a dataclass"
         undeclared = [each.name for each in fields(thing) if "kind" not in each.metadata]
         return f"its fields are not declared with `key`: {', '.join(undeclared)}" if undeclared else ""
     return str(thing.complaint()) if kind == "dialects" and hasattr(thing, "complaint") else ""
@@ -131,7 +131,7 @@ def leave(plugin: str, source: str, kind: str, name: str, why: str) -> None:
     """Report, once, that a thing of a plugin is left out."""
     of = f" of {source}" if source else ""
     text = f"{name!r} of plugin {plugin!r}{of} left out of the {kind}: {why}"
-    report(Message("NCF508", text, hint="tell its author; docs/plugins.md says what each hook registers"))
+    report(Message("NCF508", text, hint="report it to its author; docs/plugins.md describes what each hook registers"))
 
 
 MIN_WORD_LETTERS = 7
@@ -208,7 +208,7 @@ def import_hint(error: BaseException) -> str:
         if found and error.name is not None and error.name.partition(".")[0] == OWN:
             return nearest(found[1], dir(import_module(error.name)))
         return "reinstall or uninstall it"
-    return "tell its author; NCFIX_DISABLE_PLUGINS leaves it out"
+    return "report it to its author; NCFIX_DISABLE_PLUGINS leaves it out"
 
 
 def hooks_of(point: EntryPoint, module: object) -> list[pluggy.HookCaller]:
@@ -256,7 +256,7 @@ def registrations(point: EntryPoint, hooks: Iterable[pluggy.HookCaller]) -> Thin
         except Exception as error:
             place = _where(point.module, error.__traceback__, only=True)
             why = f"failed in {hook.name}: {describe(error)}{place}"
-            raise left_out("NCF504", point, why, "tell its author") from error
+            raise left_out("NCF504", point, why, "report it to its author") from error
     return things
 
 
@@ -295,7 +295,7 @@ def left_out(code: str, point: EntryPoint, why: str, hint: str) -> PluginError:
 def name_taken(plugin: str, kind: str, name: str, owner: str) -> Message:
     """The message that a name is already registered."""
     text = f"plugin {plugin!r} left out: it registers {name!r} of {kind}, which {owner} has registered"
-    return Message("NCF503", text, hint="NCFIX_DISABLE_PLUGINS leaves one of them out")
+    return Message("NCF503", text, hint="leave one of them out with NCFIX_DISABLE_PLUGINS")
 
 
 def distribution(point: EntryPoint) -> str:
@@ -422,4 +422,7 @@ def _said(plugin: Plugin) -> str:
 
 
 def _hint(plugin: Plugin) -> str:
-    return f"tell its author (ncfix --debug shows the traceback); NCFIX_DISABLE_PLUGINS={plugin.name} leaves it out"
+    return (
+        f"report it to its author (ncfix --debug shows the traceback); NCFIX_DISABLE_PLUGINS={plugin.name} leaves it "
+        "out"
+    )

@@ -127,12 +127,12 @@ class Project:
         yield from self._faults_of(self.content, {"ncfix", "programs"})
         programs = self.content.get("programs", [])
         if not isinstance(programs, list):
-            yield self.fault("programs: is a list of tables, [[programs]]", "programs")
+            yield self.fault("programs: must be a list of tables, [[programs]]", "programs")
             return
         for number, entry in enumerate(programs):
             where = ("programs", number)
             if not isinstance(entry, dict):
-                yield self.fault(f"programs[{number}]: is a table", *where)
+                yield self.fault(f"programs[{number}]: must be a table", *where)
                 continue
             match = entry.get("match")
             if not isinstance(match, str) and not (isinstance(match, list) and all(isinstance(x, str) for x in match)):
@@ -144,10 +144,10 @@ class Project:
             if key in TEXTS and not isinstance(value, str):
                 yield self.fault(f"{key}: {value!r} is not a text", *where, key)
             elif key == "options" and not isinstance(value, dict):
-                yield self.fault("options: is a table, [options]", *where, key)
+                yield self.fault("options: must be a table, [options]", *where, key)
             elif key not in {*TEXTS, "options", *others}:
                 close = get_close_matches(key, [*TEXTS, "options", *others], 1)
-                hint = f"did you mean {close[0]}?" if close else "options of verbs stand in the table [options]"
+                hint = f"did you mean {close[0]}?" if close else "options of verbs belong in the table [options]"
                 yield self.fault(f"{key}: there is no such key", *where, key, hint=hint)
 
 
@@ -170,7 +170,7 @@ def _near(path: str) -> str:
 
 def written(settings: Mapping[str, str], resume: bool) -> str:
     """The text of a project file with these settings, for people to edit."""
-    head = "# What holds for the programs in this folder and below; docs/formats.md says what may stand here.\n"
+    head = "# Settings for the programs in this folder and below; docs/formats.md lists the keys.\n"
     found = table_written(head, {key: settings.get(key) for key in TEXTS})
     options = table_written("[options]              # of ncfix fix, with _ for -", {"resume": resume})
     others = ("# tolerance_um = 1.0", "# flatten = true", "", "# [[programs]]         # the first that matches wins")

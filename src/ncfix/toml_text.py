@@ -67,10 +67,10 @@ def parsed(text: str, path: str, code: str, hint: str = "") -> dict[str, Any]:
         other = next((f"this looks like {kind}" for kind, sign in OTHERS.items() if sign.match(text)), hint)
         raise ConfigError.of(code, f"not TOML: {what}", place, other) from error
     except ValueError as error:  # Python reads whole numbers of up to 4300 digits
-        text = "not TOML that can be read: a number has thousands of digits"
+        text = "cannot be read as TOML: a number has thousands of digits"
         raise ConfigError.of(code, text, Place(path), hint) from error
     except RecursionError as error:
-        raise ConfigError.of(code, "not TOML that can be read: nested too deeply", Place(path), hint) from error
+        raise ConfigError.of(code, "cannot be read as TOML: nested too deeply", Place(path), hint) from error
 
 
 def place_of(line: int, text: str, path: str) -> Place:
@@ -331,7 +331,7 @@ class TomlTable:
             if key in self.asked:
                 continue
             if self.path and key in self.report.top:
-                meant = f"it belongs above the first table; here it is a key of {dotted(self.path)}"
+                meant = f"move it above the first table; here it is a key of {dotted(self.path)}"
             else:
                 meant = did_you_mean(key, self.asked - self.values.keys()) or did_you_mean(key, self.asked)
             self.note(self.report.codes.unknown, key, f"unknown key {key!r}", meant)
@@ -345,7 +345,7 @@ class TomlTable:
             return False
         if abs(value) > MAX_NUMBER:
             self.note(
-                self.report.codes.number, key, f"more than anything that a machine has, which is {MAX_NUMBER:g} at most"
+                self.report.codes.number, key, f"larger than any value of a machine, which is at most {MAX_NUMBER:g}"
             )
             return False
         return True

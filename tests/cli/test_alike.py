@@ -43,7 +43,7 @@ def test_other_axes_rates_and_several_figures_stay_apart() -> None:
         "1 mm at the start and 2 mm",
         "1 mm at the start and 3 mm",
     ]
-    texts += ["9 mm/min", "8 mm/min", "'1.2.3 mm' is no number", "'1.2.4 mm' is no number"]
+    texts += ["9 mm/min", "8 mm/min", "'1.2.3 mm' is not a number", "'1.2.4 mm' is not a number"]
     found = said_once([message for line, text in enumerate(texts, start=1) for message in said(line, text=text)])
     assert [message.text for message in found] == texts
 

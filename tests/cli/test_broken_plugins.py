@@ -126,7 +126,7 @@ CASES = {
                          ("machine", "show", "{wavy}"), "failed as the basis 'wave': ZeroDivisionError"),
     "basis of another shape": Case("bases", "def rows(self, u, d):\n    return u\nWave.rows = rows\n", "register(Wave)",
                                    ("machine", "show", "{wavy}"), "rows gives shape (3,)"),
-    "no basis": Case("bases", "", "register(Wave(), 'wave')", ("machine", "show", "{wavy}"), "it is no class",
+    "no basis": Case("bases", "", "register(Wave(), 'wave')", ("machine", "show", "{wavy}"), "it is not a class",
                      "NCF508"),
     "a basis that lacks something": Case("bases", "del Wave.title\n", "register(Wave)", ("effects", "--bases"),
                                          "'wave' of plugin 'third' of somebodys-tools left out of the bases: "

@@ -67,7 +67,7 @@ def test_protocol_of_the_chain(ncfix: Any, root: Path) -> None:
 def test_protocol_of_a_machine_is_about_constants(ncfix: Any, root: Path) -> None:
     text = ncfix("derive", "-m", root / "examples/machines/three_axis.toml", "--protocol").out.decode()
     assert "with X, Y, Z varied: rank 9 of 24" in text
-    assert "only together: EZ0S + EZ0Z\n" in text
+    assert "only in combination: EZ0S + EZ0Z\n" in text
     assert "Differences of readings" not in text  # nothing turns
 
 

@@ -58,7 +58,7 @@ def test_the_probe_needs_no_settings_and_says_what_to_do(shop: Any, ncfix: Any) 
     control = get_control("siemens")
     for name in (SIGN_PROBE, PRODUCT_PROBE):
         remarks = control.lint({name: (folder / name).read_bytes()})
-        assert all("no file says" in message.text for message in remarks)  # which is what the probe is for
+        assert all("no file states" in message.text for message in remarks)  # which is what the probe is for
 
 
 def test_the_probe_as_json_with_other_axes(shop: Any, ncfix: Any) -> None:
@@ -71,7 +71,7 @@ def test_the_probe_as_json_with_other_axes(shop: Any, ncfix: Any) -> None:
 
 def test_other_controls_have_nothing_to_probe(shop: Any, ncfix: Any) -> None:
     result = ncfix("export", "linuxcnc", "-m", shop.machine, "-o", shop.folder / "t", "--probe")
-    assert (result.code, "nothing to probe" in result.err) == (ExitCode.USAGE, True)
+    assert (result.code, "no test on the machine" in result.err) == (ExitCode.USAGE, True)
 
 
 def test_the_machine_of_the_thesis_takes_20_tables(root: Path, ncfix: Any, tmp_path: Path) -> None:

@@ -102,7 +102,7 @@ def test_a_machine_whose_travels_may_be_in_inches_is_remarked_on() -> None:
     small = changed("[0, 500]", "[0, 20]").replace("[0, 400]", "[0, 16]").replace("[-300, 0]", "[-12, 0]")
     (found,) = doubts(loads(small), "m.toml")
     assert (found.message.code, found.impossible) == ("NCF322", False)
-    assert found.message.hint == "is it in inches, 508 mm? `range` is in mm"
+    assert found.message.hint == "is it given in inches? That would be 508 mm"
 
 
 def test_a_machine_that_is_left_handed_is_remarked_on() -> None:

@@ -176,14 +176,14 @@ def test_verify_and_check_know_the_machine(ncfix: Any, yard: Path) -> None:
         ("[options]\noffset = 3", "NCF028: offset: '3' has no ="),
         ("[options]\nforce = true", "NCF028: force: can be given on the command line"),
         ("[options]\nin_place = true", "hint: --in-place"),
-        ("[options]\nexecutor = 'dask://elsewhere:8786'", "NCF028: executor: is said on the command line"),
+        ("[options]\nexecutor = 'dask://elsewhere:8786'", "NCF028: executor: can be given on the command line"),
         ("setup = ''", "NCF028: setup: the text is empty"),
         ('output = "a\\u0000b"', "contains a NUL character"),
         ("\n[[programs]]\nmatch = '*'\ntool_table = ''", "ncfix.toml:4:1"),
         ("[options]\ntool = '1=1'\n[[programs]]\nmatch='*'\n[programs.options]\ntool = '1'", "ncfix.toml:6:1"),
         ("programs = 3", "list of tables"),
         ("[[programs]]\nmachine = 'x'", "needs match"),
-        ("options = 3", "is a table"),
+        ("options = 3", "must be a table"),
     ],
 )
 def test_what_is_wrong_is_named(ncfix: Any, yard: Path, text: str, said: str) -> None:

@@ -29,8 +29,8 @@ def constant(name: str, value: float) -> str:
 @pytest.mark.parametrize(
     ("control", "options", "said"),
     [
-        ("linuxcnc", (), "Straightness, squareness, angles"),
-        ("fanuc-pitch", SIGN, "No tables of this kind can leave less than"),
+        ("linuxcnc", (), "straightness, squareness, angular errors"),
+        ("fanuc-pitch", SIGN, "With tables of this kind, at least"),
         ("heidenhain", SIGN, "cannot follow angular errors"),
     ],
 )
@@ -41,7 +41,7 @@ def test_a_model_that_the_format_cannot_express(
     result = ncfix("export", control, "-m", machine, "-o", shop.folder / "t", "--tool-length", "80", *options)
     assert result.code == ExitCode.DONE
     assert said in result.err
-    assert "can leave less than" in (shop.folder / "t" / "hand-over.md").read_text()
+    assert "With tables of this kind, at least" in (shop.folder / "t" / "hand-over.md").read_text()
 
 
 REFUSED = {
@@ -51,11 +51,11 @@ REFUSED = {
         constant("EXX", 0.01),
         2,
         "NCF483",
-        "beyond its travel",
+        "exceeds its travel",
     ),
     "too many points": ("heidenhain", (*SIGN, "--set", "points=257"), constant("EXX", 0.01), 2, "NCF485", "256"),
     "too many tables": ("siemens", (*SIEMENS, "--set", "tables=129"), constant("EXX", 0.01), 2, "NCF485", "128"),
-    "no sign": ("fanuc", (), constant("EXX", 0.01), 2, "NCF485", "needs the option 'sign'"),
+    "no sign": ("fanuc", (), constant("EXX", 0.01), 2, "NCF485", "needs the setting 'sign'"),
     "beyond what the machine allows": (
         "isg",
         ("--force",),
@@ -86,7 +86,7 @@ def test_values_beyond_the_format(shop: Any, ncfix: Any, control: str) -> None:
     machine.write_text("max_correction = { linear = 50, rotary = 1 }\n" + machine.read_text())
     result = ncfix("export", control, "-m", machine, "-o", shop.folder / "t", "--force", *SIGN)
     assert (result.code, "NCF484" in result.err) == (ExitCode.REFUSED, True), result.err
-    assert "is the error in mm?" in result.err
+    assert "check that the error is in mm" in result.err
 
 
 def exported(shop: Any, ncfix: Any, control: str, *options: str) -> Path:
@@ -109,7 +109,7 @@ def edit_fanuc(folder: Path) -> str:
     found = json.loads(file.read_text())
     found["records"][0]["data"].append(0)
     file.write_text(json.dumps(found))
-    return "values and says"
+    return "values, but states"
 
 
 def edit_isg(folder: Path) -> str:
@@ -158,7 +158,7 @@ def test_tables_of_another_machine_and_of_another_control(shop: Any, ncfix: Any)
     result = ncfix("emulate", "isg", folder, "-m", other)
     assert (result.code, "another machine, or for other errors of it" in result.err) == (ExitCode.REFUSED, True)
     result = ncfix("emulate", "linuxcnc", folder, "-m", other)
-    assert (result.code, "tables for isg, not linuxcnc" in result.err) == (ExitCode.REFUSED, True)
+    assert (result.code, "tables are for the control isg, not linuxcnc" in result.err) == (ExitCode.REFUSED, True)
 
 
 def test_a_folder_that_is_none(shop: Any, ncfix: Any) -> None:
@@ -174,14 +174,14 @@ def test_tables_that_cover_less_than_the_travel_say_so(shop: Any, ncfix: Any) ->
         "export", "isg", "-m", machine, "-o", shop.folder / "t", "--range", "X=100:200", "--tool-length", "80"
     )
     assert result.code == ExitCode.DONE
-    assert "They cover X from 100 to 200, of a travel from 0 to 500" in result.err
+    assert "The tables cover X from 100 to 200, of a travel from 0 to 500" in result.err
 
 
 def test_the_sheet_says_what_must_be_seen_at_the_machine(shop: Any, ncfix: Any) -> None:
     """Half-way to the corners the roll of X turns the tip by up to 40 urad times three quarters of the travel."""
     folder = exported(shop, ncfix, "isg")
     text = (folder / "hand-over.md").read_text()
-    for said in ("Before you begin", "No axis may move by more than this", "What the control must add then"):
+    for said in ("Before you begin", "No axis may move by more than this", "What the control must then add"):
         assert said in text
     assert "Positions count from: machine coordinates" in text
     assert ": X -10.0 um" in text

@@ -203,8 +203,8 @@ def test_what_was_measured_against_the_model(backlash: Diagnosis) -> None:
     """A play of its own sign for each direction, and the model within three bands of what was measured."""
     drawn = list(measured_curves(backlash, backlash.findings[0]))
     plus, minus = [each for each in drawn if each.component == "dx"]
-    assert plus.title == "backlash X, X moving in plus"
-    assert minus.title == "backlash X, X moving in minus"
+    assert plus.title == "backlash X, X moving towards plus"
+    assert minus.title == "backlash X, X moving towards minus"
     assert np.sign(plus.model).sum() == -np.sign(minus.model).sum() != 0
     assert all((np.abs(each.measured - each.model) < 3 * each.spread).all() for each in (plus, minus))
 
@@ -212,7 +212,7 @@ def test_what_was_measured_against_the_model(backlash: Diagnosis) -> None:
 def test_a_picture_for_papers(backlash: Diagnosis) -> None:
     pytest.importorskip("matplotlib")
     drawn = picture(backlash, "svg")
-    assert b"backlash X, X moving in minus" in drawn
+    assert b"backlash X, X moving towards minus" in drawn
     assert drawn == picture(backlash, "svg")
 
 
@@ -299,7 +299,7 @@ def test_play_is_not_looked_for_where_a_file_does_not_say_from_where_the_axis_ca
     seen = residual_data([simulate(each, known, Faults(NOISE_UM), 1) for each in (first, silent)], known)
     [message] = remarks(seen, ())
     assert message.code == "NCF658"
-    assert "silent.csv does not say from where X came" in message.text
+    assert "silent.csv does not state the direction of approach of X" in message.text
     names = {each.name for each in catalogue(seen.measured)}
     assert "backlash X" not in names
     assert "backlash Y" in names

@@ -110,7 +110,7 @@ def test_a_tool_that_was_not_used_is_marked_in_the_file() -> None:
     assert new_tools(poses, used) == ()
     assert new_tools(poses, used[:1]) == tuple(used[1:])
     text = dumps(marked(poses, ("X",), (300.0,)), ("dx",))
-    assert "mind the clearance; tool of 300 mm: or one that differs as much" in text
+    assert "check the clearance; tool of 300 mm: or another one that differs as much" in text
 
 
 def test_the_chance_of_one_name_is_that_of_odds_that_scatter() -> None:

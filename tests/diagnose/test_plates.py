@@ -33,7 +33,7 @@ def test_a_clear_pattern_without_a_name_is_said_whatever_the_noise(shared: Calla
     found = diagnose([plate(shared("measurements"), "D1396A1")], mill())
     assert (found.verdict, found.findings) == (UNKNOWN, ())
     assert "without a name: 3.3 um rms" in text(found)
-    assert "dx is bent like an S along Y" in text(found)
+    assert "dx is cubic along Y" in text(found)
 
 
 @pytest.fixture(scope="module")

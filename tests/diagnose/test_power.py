@@ -27,9 +27,11 @@ def test_sizes_are_said_once_and_names_that_cannot_show_count() -> None:
     sizes = {"EXX": 1.5, "EYX": 1.5, "EZX": 6.0, "drift X": np.inf}
     assert (
         findable_in_words(sizes, 5, SIZES)
-        == "what would have been found: from 1.5 um rms on 2 of 5 effects, from 6 um rms on 3"
+        == "these data would have shown: from 1.5 um rms on 2 of 5 effects, from 6 um rms on 3"
     )
     assert not shows_hardly_anything(sizes, SIZES)  # of any number in the catalogue
     assert shows_hardly_anything({**sizes, "EZX": np.inf, "drift Y": np.inf}, SIZES)
     assert shows_hardly_anything({}, SIZES)
-    assert findable_in_words({"EXX": np.inf}, 9, SIZES) == "none of 9 effects would have been found, were it 24 um rms"
+    assert (
+        findable_in_words({"EXX": np.inf}, 9, SIZES) == "none of 9 effects would have been found, even with 24 um rms"
+    )

@@ -97,4 +97,4 @@ def test_what_exceeds_the_noise_is_not_called_noise(known: Machine) -> None:
     rungs = {rung.name: rung for rung in ladder(found)}
     assert rungs[UNEXPLAINED].share > 0.5
     assert rungs[NOISE].share < 0.3
-    assert "follows no pattern" in text(found)
+    assert "without a pattern" in text(found)

@@ -48,5 +48,5 @@ def test_what_was_there_before_is_no_change(known: Machine) -> None:
 
 
 def test_one_date_is_refused(known: Machine) -> None:
-    with pytest.raises(UsageError, match="one of each date"):
+    with pytest.raises(UsageError, match="files of two dates"):
         diagnose([measured(known, 1)], known, since=True)

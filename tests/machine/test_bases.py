@@ -157,7 +157,7 @@ def test_feature_lengths(basis: Basis, feature: float) -> None:
         (Spline((0.0, 1.0), 0), "degree", "degree 1 or more"),
         (Spline((0.0, 1.0), 3), "knots", "needs at least 8 knots"),
         (Spline((0.0, 0.0, 2.0, 1.0, 3.0, 3.0), 1), "knots", "2 is followed by 1"),
-        (Spline((0.0, 1.0, 1.0, 2.0), 1), "knots", "leave no range"),
+        (Spline((0.0, 1.0, 1.0, 2.0), 1), "knots", "enclose no range"),
         (PiecewiseConstant((1.0,), "up"), "direction", "'up' is none of both, positive, negative"),
     ],
 )

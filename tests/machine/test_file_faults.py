@@ -19,7 +19,7 @@ EFFECT = 'name = "EC0Y"\ncoefficients = [12e-6]'
 MISTAKES = [
     # the file
     ("name = \"DMU 50 eVolution\"", "name = ", "NCF301", "not TOML"),
-    ("ncfix = 1 ", "ncfix = 3 ", "NCF317", "schema version 3, this ncfix reads 1"),
+    ("ncfix = 1 ", "ncfix = 3 ", "NCF317", "version 3 of the machine file; this ncfix reads version 1"),
     ('control = "heidenhain"', 'contrl = "heidenhain"', "NCF302", "unknown key 'contrl' | did you mean 'control'?"),
     ("topology = \"w C B F X Y Z t\"", "", "NCF303", "key 'topology' is missing"),
     ('control = "heidenhain"', "control = 5", "NCF304", "control: expected a string, found 5"),
@@ -60,19 +60,19 @@ MISTAKES = [
     (EFFECT, 'name = "EC0Y"\ncoefficients = 12e-6', "NCF304", "expected a list of numbers, found 1.2e-05"),
     (EFFECT, 'name = "EC0Y"\ncoefficients = [nan]', "NCF305", "nan is not a finite number"),
     (EFFECT, 'name = "EC0Y"\ncoefficients = [true]', "NCF304", "expected a list of numbers, found true"),
-    (EFFECT, 'name = "EC0Y"\ncoefficients = [1, 2]', "NCF311", "2 coefficients, the basis constant has 1"),
+    (EFFECT, 'name = "EC0Y"\ncoefficients = [1, 2]', "NCF311", "2 coefficients, but the basis constant needs 1"),
     (EFFECT, EFFECT + "\ndegree = [1]", "NCF302", "unknown key 'degree'"),
     (EFFECT, EFFECT + "\ncarried = 1", "NCF304", "expected true or false, found 1"),
     (EFFECT, EFFECT + "\nscale = 0", "NCF305", "the scale cannot be zero"),
     (EFFECT, EFFECT + "\ncovariance = [[-1.0]]", "NCF312", "a variance is negative"),
     (EFFECT, EFFECT + "\ncovariance = [[1.0, 0]]", "NCF304", "expected 1 rows of 1 numbers"),
     (EFFECT, EFFECT + '\ninput = "Q"', "NCF314", "'Q' is neither an axis of this machine nor the name of an input"),
-    (EFFECT, EFFECT + "\ntime_constant_s = 5", "NCF315", "a lag acts on an `input`, and there is none"),
+    (EFFECT, EFFECT + "\ntime_constant_s = 5", "NCF315", "a time constant needs an `input`, but none is given"),
     (EFFECT, EFFECT + '\nbasis = "polynomial"\ndegree = [1]', "NCF315", "no position for polynomial to depend on"),
     (EFFECT, EFFECT + '\nbasis = "backlash"', "NCF315", "EC0Y has no direction of motion"),
     (EFFECT, EFFECT + '\nbasis = "splin"', "NCF310", "there is no basis 'splin' | did you mean 'spline'?"),
-    ('[1, 2, 3]\ncenter', '[1, 2, 2]\ncenter', "NCF316", "names a value twice"),
-    ('[1, 2, 3]\ncenter', '[1, 2]\ncenter', "NCF311", "3 coefficients, the basis polynomial has 2 | one each"),
+    ('[1, 2, 3]\ncenter', '[1, 2, 2]\ncenter', "NCF316", "has a value twice"),
+    ('[1, 2, 3]\ncenter', '[1, 2]\ncenter', "NCF311", "3 coefficients, but the basis polynomial needs 2 | one each"),
     ('[1, 2, 3]\ncenter', '3\ncenter', "NCF304", "expected a list of whole numbers, found 3"),
     ("degree = [1, 2, 3]", "degre = [1, 2, 3]", "NCF303", "key 'degree' is missing | did you mean 'degre'?"),
     ("[0, 1e-8, 0]", "[1e-8, 1e-8, 0]", "NCF312", "not symmetric"),
@@ -147,7 +147,7 @@ def test_one_mistake_does_not_make_others(old: str, new: str, codes: list[str]) 
 
 def test_a_key_below_the_tables_is_not_a_key_of_the_file() -> None:
     (fault,) = faults(changed("pitch = 10.0", "max_correction = { linear = 1 }"))
-    assert fault.hint == "it belongs above the first table; here it is a key of axis.X"
+    assert fault.hint == "move it above the first table; here it is a key of axis.X"
 
 
 def test_a_misspelled_table_is_shown_where_it_stands() -> None:
@@ -157,11 +157,11 @@ def test_a_misspelled_table_is_shown_where_it_stands() -> None:
 
 
 def test_numbers_that_no_machine_has() -> None:
-    assert "more than anything" in faults(changed("[0, 0, 154.996]", "[0, 0, 1e300]"))[0].text
-    assert "more than anything" in faults(changed("[0, 0, 154.996]", f"[0, 0, 1{'0' * 400}]"))[0].text
+    assert "larger than any value" in faults(changed("[0, 0, 154.996]", "[0, 0, 1e300]"))[0].text
+    assert "larger than any value" in faults(changed("[0, 0, 154.996]", f"[0, 0, 1{'0' * 400}]"))[0].text
     assert "thousands of digits" in faults(changed("[0, 0, 154.996]", f"[0, 0, 1{'0' * 5000}]"))[0].text
-    assert "goes beyond 1000" in faults(changed("degree = [1, 2, 3]", "degree = [1, 2, 999999999]"))[0].text
-    assert "is no scale" in faults(changed("scale = 250.0", "scale = 1e-320"))[0].text
+    assert "exceeds 1000" in faults(changed("degree = [1, 2, 3]", "degree = [1, 2, 999999999]"))[0].text
+    assert "is not a possible scale" in faults(changed("scale = 250.0", "scale = 1e-320"))[0].text
     text = changed("degree = [1, 2, 3]\ncenter = 250.0\nscale = 250.0", "degree = [1, 2, 900]")
     (fault,) = faults(text)
     assert (fault.code, fault.text) == ("NCF305", "effect[0]: the effect is not finite at the ends of the travel")

@@ -50,13 +50,13 @@ def test_several_components_take_their_coefficients_in_turn() -> None:
 def test_a_lag_may_be_given() -> None:
     text = "coefficients = [0.002]\ntime_constant_s = 2400"
     assert loads(one("spindle-growth-late", text)).effects[0].time_constant_s == 2400
-    assert "follows nothing" in codes(one("backlash-X", text))["NCF315"]
+    assert "does not follow an input" in codes(one("backlash-X", text))["NCF315"]
     assert "several time constants" in codes(one("warming-X", text.replace("[0.002]", "[1e-3, 1e-3]")))["NCF315"]
     assert "NCF305" in codes(one("spindle-growth-late", "coefficients = [1]\ntime_constant_s = 0"))
 
 
 def test_what_is_wrong_is_named() -> None:
-    assert "2 coefficients, backlash-X has 1" in codes(one("backlash-X", "coefficients = [1, 2]"))["NCF311"]
+    assert "2 coefficients, but backlash-X has 1" in codes(one("backlash-X", "coefficients = [1, 2]"))["NCF311"]
     assert "NCF303" in codes(one("backlash-X", ""))
     assert "NCF302" in codes(one("backlash-X", "coefficients = [1]\nbasis = 'table'"))
     assert "did you mean 'backlash-X'" in codes(one("backlsh-X", "coefficients = [1]"))["NCF309"]

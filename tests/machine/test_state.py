@@ -117,7 +117,9 @@ def test_an_input_that_is_missing_is_named() -> None:
     growth = Effect("EZS", (0.001,), Polynomial((1,)), input="temp_spindle", time_constant_s=10.0)
     machine = MACHINE.replace(effects=(growth,))
     assert machine.inputs == {"temp_spindle", "time_s"}
-    with pytest.raises(UsageError, match="NCF340: the machine's errors depend on 'temp_spindle', which is not given"):
+    with pytest.raises(
+        UsageError, match="NCF340: an error of the machine depends on 'temp_spindle', whose value is not given"
+    ):
         machine.error(at(), State(inputs={"time_s": 0.0}))
     with pytest.raises(UsageError, match="'time_s'"):
         machine.actual_tip(at(), State(inputs={"temp_spindle": 0.0}))

@@ -61,7 +61,7 @@ REFUSED = {
     "a gap": (lambda text: cell(text, 3, "dy", lambda _: ""), "NCF607", "column 'dy' is empty in this row"),
     "not a number": (lambda text: cell(text, 3, "dy", lambda _: "n/a"), "NCF608", "is not a number"),
     "a decimal comma": (lambda text: cell(text, 3, "dy", lambda value: value.replace(".", ",")), "NCF606", "cells"),
-    "a reading marked by nines": (lambda text: cell(text, 3, "dy", lambda _: "-9999"), "NCF612", "not read?"),
+    "a reading marked by nines": (lambda text: cell(text, 3, "dy", lambda _: "-9999"), "NCF612", "missing reading?"),
     "an axis that is not there": (lambda text: text.replace(",B,", ",A,"), "NCF610", "no axis A, only C B X Z Y"),
     "time going backwards": (lambda text: cell(text, 9, "time_s", lambda _: "5"), "NCF611", "5 s after 240 s"),
 }
@@ -97,7 +97,9 @@ def test_a_good_measurement_is_not_remarked_upon(good: Measurement) -> None:
 
 
 def test_too_few_rows_are_counted(good: Measurement) -> None:
-    with pytest.raises(NcfixError, match=r"9 values for 1\d coefficients and 8 unknowns of the set-up") as caught:
+    with pytest.raises(
+        NcfixError, match=r"9 values are too few for 1\d coefficients and 8 unknowns of the set-up"
+    ) as caught:
         calibrated(dumps(good.rows(slice(3))))
     assert caught.value.code == "NCF630"
 
@@ -106,7 +108,7 @@ def test_a_duplicated_pose_is_named_and_kept(good: Measurement) -> None:
     copied = dumps(good) + dumps(good).splitlines()[-1] + "\n"
     found = calibrated(copied)
     (said,) = [m for m in found.remarks if m.code == "NCF613"]
-    assert "with the same values: was it copied?" in str(said)
+    assert "with the same values; was the row copied?" in str(said)
     assert len(found.problem.values) == 3 * (ROWS + 1)
 
 
@@ -114,14 +116,14 @@ def test_repeats_without_a_column_are_remarked_upon_once(good: Measurement) -> N
     last = dumps(good).splitlines()[-1].rsplit(",", 1)[0]
     found = calibrated(dumps(good) + "".join(f"{last},0.00{k}\n" for k in range(1, 4)))
     (said,) = [m for m in found.remarks if m.code == "NCF613"]
-    assert "taken as a repeat (2 more rows likewise)" in str(said)
+    assert "taken as a repeat (and 2 more such rows)" in str(said)
 
 
 def test_an_outlier_is_named_with_its_line_and_stays_in_the_file(good: Measurement) -> None:
     text = cell(dumps(good), 42, "dz", lambda value: f"{float(value) + 0.5:.6f}")
     found = calibrated(text)
     (said,) = [m for m in found.remarks if m.code == "NCF633"]
-    assert "dz is +" in str(said)
+    assert "dz differs by +" in str(said)
     assert said.place is not None
     assert text.splitlines()[said.place.line - 1].split(",") == text.splitlines()[-ROWS + 42].split(",")
     assert len(found.problem.values) == 3 * ROWS

@@ -110,7 +110,7 @@ def test_what_is_not_seen_is_said_once():
     flat = plan(known, "tcp", 60).with_columns({"Z": np.zeros(60)})
     data = simulate(flat, known, Faults(noise_um=1.0), seed=3)
     [said] = [str(message) for message in calibrate([data], known, "EXX,EZZ,EXZ").remarks if message.code == "NCF632"]
-    assert "EZZ, EXZ are held as they are: the unknown set-up takes the place of them" in said
+    assert "EZZ, EXZ keep the value of the machine file: the unknown set-up has the same effect as them" in said
 
 
 def test_one_setting_of_an_axis_hides_its_location():

@@ -47,10 +47,10 @@ def test_a_time_constant_comes_back():
 
 def test_what_does_not_lag_has_no_time_constant():
     data = warmed(THREE.replace(effects=(late(2400.0),)))
-    with pytest.raises(UsageError, match="no effect that is estimated has a time constant"):
+    with pytest.raises(UsageError, match="none of the estimated effects has a time constant"):
         calibrate([data], THREE, "spindle-growth", time_constants=True)
     timeless = Measurement("tcp", (), {n: v for n, v in data.columns.items() if n != "time_s"}, data.labels)
-    with pytest.raises(UsageError, match="no column says the time"):
+    with pytest.raises(UsageError, match="there is no column time_s"):
         calibrate([timeless], THREE, "spindle-growth-late", time_constants=True)
 
 

@@ -154,10 +154,10 @@ def test_signs_name_the_axis_that_is_turned_round() -> None:
     turned = data.with_columns({"dy": -data.columns["dy"]})
     (said,) = [each for each in calibrate([turned], perfect(known)).remarks if each.code == "NCF617"]
     assert "dx, -dy, dz" in said.text
-    assert "y axis is turned round" in said.hint
+    assert "y axis is in the opposite direction" in said.hint
     wrong = data.with_columns({"C": -data.columns["C"]})
     (said,) = [each for each in calibrate([wrong], perfect(known)).remarks if each.code == "NCF617"]
-    assert said.text.startswith("C is turned round")
+    assert said.text.startswith("C has the opposite sign")
 
 
 def gauges(known: Machine, factor: float) -> Measurement:
@@ -176,7 +176,7 @@ def test_two_gauges_of_which_one_is_wrong() -> None:
     free = Machine.replace(known, effects=())
     assert refusals(calibrate([gauges(known, 1.0)], free, "EXX"), []) == ()
     (said,) = refusals(calibrate([gauges(known, 1 + 63e-6)], free, "EXX"), [])
-    assert (said.code, "cannot all be true" in said.text) == ("NCF617", True)
+    assert (said.code, "contradict each other" in said.text) == ("NCF617", True)
 
 
 def test_what_is_nearly_unobservable_is_held_and_named() -> None:

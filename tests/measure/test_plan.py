@@ -183,7 +183,7 @@ def test_few_poses_are_planned_too():
 
 
 def test_a_kind_that_sees_nothing_is_refused():
-    with pytest.raises(UsageError, match="no pose of this kind tells anything"):
+    with pytest.raises(UsageError, match="no pose of this kind distinguishes any"):
         plan(machine("three_axis"), "probe", 5, effects="EXX")
 
 
@@ -219,7 +219,7 @@ def test_an_r_test_at_a_ball_that_is_given():
     assert (len(found), set(found.labels["set"])) == (300, {"here"})
     tips = known.tip(found.positions(known), found.column("tool_length"))
     assert np.abs(tips - (150.0, 100.0, 120.0)).max() < 3e-3
-    with pytest.raises(UsageError, match="the ball here stands where the tip may not go"):
+    with pytest.raises(UsageError, match="the ball here is outside the --reach of the tip"):
         plan(known, "tcp", 20, Room(balls=room.balls, reach={"x": (-50.0, 50.0)}), "EX0C")
     with pytest.raises(UsageError, match="no ball can be reached"):
         plan(known, "tcp", 20, Room(balls={"far": (9000.0, 0.0, 0.0)}), "EX0C")

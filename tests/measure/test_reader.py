@@ -117,15 +117,15 @@ def test_a_fault_is_named_with_its_place(name):
 
 
 SAID = {
-    "units in names": (HEAD + "X [mm];Y/mm;dx (\u00b5m)\n1,5;2;0,001\n", "call it dx, without a unit"),
-    "a line of units": (HEAD + "X,Y,dx\nmm,mm,um\n1,2,0.001\n", "leave out the line with units"),
-    "units in cells": (HEAD + "X,Y,dx\n1 mm,2,0.001\n", "a cell has the number alone"),
-    "a number in groups": (HEAD + "X;Y;dx\n1.000,5;2;0,001\n", "without marks of thousands"),
-    "groups by blanks": (HEAD + "X;Y;dx\n1\u00a0000,5;2;0,001\n", "without marks of thousands"),
+    "units in names": (HEAD + "X [mm];Y/mm;dx (\u00b5m)\n1,5;2;0,001\n", "name it dx, without a unit"),
+    "a line of units": (HEAD + "X,Y,dx\nmm,mm,um\n1,2,0.001\n", "remove the line with units"),
+    "units in cells": (HEAD + "X,Y,dx\n1 mm,2,0.001\n", "write the number without a unit"),
+    "a number in groups": (HEAD + "X;Y;dx\n1.000,5;2;0,001\n", "without thousands separators"),
+    "groups by blanks": (HEAD + "X;Y;dx\n1\u00a0000,5;2;0,001\n", "without thousands separators"),
     "names once more": (HEAD + "X,Y,dx\n1,2,0.001\nX,Y,dx\n2,2,0.001\n", "the columns are named once"),
-    "a minus of a typesetter": (HEAD + "X,Y,dx\n1,\u22122,0.001\n", "a minus is written -"),
-    "a dash for no reading": (HEAD + "X,Y,dx\n1,2,-\n", "leave out a row"),
-    "no number for no reading": (HEAD + "X,Y,dx\n1,2,NaN\n", "leave out a row"),
+    "a minus of a typesetter": (HEAD + "X,Y,dx\n1,\u22122,0.001\n", "write a minus sign as -"),
+    "a dash for no reading": (HEAD + "X,Y,dx\n1,2,-\n", "leave out the row"),
+    "no number for no reading": (HEAD + "X,Y,dx\n1,2,NaN\n", "leave out the row"),
     "noise with a comma": (GOOD.replace("1.5", "1,5"), "a decimal point, not a comma"),
 }
 
@@ -398,7 +398,7 @@ def test_the_forms_of_an_interferometers_file(text: str):
         ("Axis: X", "Axis: l\u00e4ngs", "the axis is"),
         ("TITLE: spring", "TITLE: Straightness of X", "another error than positioning"),
         ("2 1 0.4", "2 4 0.4", "target 4 of 3"),
-        ("2 1 0.4", "2 1", "not a line of run, target and deviation"),
+        ("2 1 0.4", "2 1", "not a line with run, target and deviation"),
         ("2 1 0.4", "2 1 0,4", "'0,4' is not a number"),
         ("Target-count: 3", "Target-count: 4", "is a part of the file missing?"),
         ("Targets:", "Target:", "no line `Targets:`"),
@@ -466,13 +466,13 @@ def test_deviations_in_millimetres_are_remarked():
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("X EYY\n0 0\n100 0.01\n", "EYY beside positions of X"),
+        ("X EYY\n0 0\n100 0.01\n", "EYY is not an error of X"),
         ("EXX EYX\n0 0\n0.01 100\n", "the first column is 'EXX'"),
         ("position,EXX\n0,0\n100,0.01\n", "the first column is 'position'"),
-        ("X EXX EXX\n0 0 0\n100 0.01 0.02\n", "a column stands twice"),
-        ("X EXX [um]\n0 0\n100 10\n", "'\\[um\\]' is no error of X"),
+        ("X EXX EXX\n0 0 0\n100 0.01 0.02\n", "a column appears twice"),
+        ("X EXX [um]\n0 0\n100 10\n", "'\\[um\\]' is not an error of X"),
         ("X Y EXX\n0 0 0\n", "a grid over several axes"),
-        ("X;EXX\n0;0\n100;0,01\n", "3 cells, there are 2 columns(.|\n)*decimal point"),
+        ("X;EXX\n0;0\n100;0,01\n", "3 cells, but 2 columns(.|\n)*decimal point"),
         ("[EXX]\nGridpoints = {\n 0 0\n 50 5 1\n 100 10\n}\n", "4:1: NCF618: not understood"),
         ("[EXX]\nUNIT = um\nGridpoints = {\n 0 0\n 100 10\n}\n", "2:1: NCF618: not understood"),
         ("[C0B\nVALUE = 1e-5\n[EXX]\nGridpoints = {\n 0 0\n}\n", "1:1: NCF618: not understood"),

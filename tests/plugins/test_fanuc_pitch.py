@@ -100,7 +100,7 @@ def test_a_rotary_axis_closes_over_a_turn(root: Path) -> None:
         return [message.text for message in CONTROL.lint(broken)]
 
     assert "behind its first point add up to" in lint(first + 3, 7)[0]
-    assert "the same place, has" in lint(first, 0)[0]
+    assert "at the same position, has" in lint(first, 0)[0]
 
 
 def test_the_intervals_of_a_turn_fill_it_exactly(root: Path) -> None:
@@ -186,7 +186,7 @@ def test_what_only_an_offset_would_help_is_left() -> None:
     made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS), 50)
     assert "pitch_X.csv" not in made.native
     assert (made.left.after == made.left.before).all()
-    assert any(note.startswith("X: no points.") and "-10.0 um" in note for note in made.notes)
+    assert any(note.startswith("X: no points are written.") and "-10.0 um" in note for note in made.notes)
 
 
 FILES = long_screw()
@@ -195,7 +195,7 @@ BROKEN = {
     "a point gone": (("pitch_X.csv", b"3,", b"4,"), "point 4 after point 2"),
     "a word": (("pitch_X.csv", b"1,0", b"1,O"), "not a point number"),
     "no head": (("pitch_X.csv", b"no,value\n", b""), "should begin with no,value"),
-    "other numbers": (("parameters.txt", b"N03622A1P10", b"N03622A1P11"), "the parameters say 1 to 11"),
+    "other numbers": (("parameters.txt", b"N03622A1P10", b"N03622A1P11"), "the parameters state 1 to 11"),
     "no interval": (("parameters.txt", b"N03624A1P62.5000", b"N03624A1P0"), "an interval of zero"),
     "a parameter gone": (("parameters.txt", b"N03623A1P1;\n", b""), "not all parameters of axis 1"),
     "no tape marks": (("parameters.txt", b"%\n", b""), "begin and end with a line %"),

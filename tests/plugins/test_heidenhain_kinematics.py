@@ -84,7 +84,7 @@ def test_the_sign_turns_every_value() -> None:
 
 @pytest.mark.parametrize("given", [{}, {"sign": "error"}, {"angle_unit": "deg"}])
 def test_what_cannot_be_known_must_be_said(given: dict[str, str]) -> None:
-    with pytest.raises(UsageError, match="needs the option"):
+    with pytest.raises(UsageError, match="needs the setting"):
         CONTROL.settings(given)
 
 
@@ -95,7 +95,7 @@ def test_the_mean_of_both_ways_is_said() -> None:
     )
     machine = loads(text + '[[effect]]\nname = "EYX"\nbasis = "backlash"\ncoefficients = [0.004]\n')
     written = CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS))
-    assert any("(play) is left: up to 2.00 um" in note for note in written.notes)
+    assert any("(play) are not corrected: up to 2.00 um remain" in note for note in written.notes)
     assert not any("backlash=on" in note for note in written.notes)
     machine = single_error("EXX").replace(effects=(Effect("EXX", (0.004,), Backlash()),))
     written = CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS))
@@ -160,10 +160,10 @@ FILES = dict(exported(single_error("EYX"), 50).native)
 BROKEN = {
     "no base": (("kinematics.tab", b"3      MachAxis Z\n4      MachBase", b"3      MachAxis Z"), "one row MachBase"),
     "cut short": (("kinematics.tab", b"[END]\n", b""), "[END] is missing"),
-    "an unknown key": (("kinematics.tab", b"MachAxis Y", b"MachAxes Y"), "is no key"),
-    "an unknown axis": (("kinematics.tab", b"MachAxis Y", b"MachAxis Q"), "is no axis"),
-    "an axis twice": (("kinematics.tab", b"MachAxis Y", b"MachAxis X"), "an axis is there twice"),
-    "a row gone": (("kinematics.tab", b"2      MachAxis Y\n", b""), "row 3 where 2 should be"),
+    "an unknown key": (("kinematics.tab", b"MachAxis Y", b"MachAxes Y"), "is not a key"),
+    "an unknown axis": (("kinematics.tab", b"MachAxis Y", b"MachAxis Q"), "is not an axis"),
+    "an axis twice": (("kinematics.tab", b"MachAxis Y", b"MachAxis X"), "an axis appears twice"),
+    "a row gone": (("kinematics.tab", b"2      MachAxis Y\n", b""), "row 3 instead of row 2"),
     "a column that is not there": (("kinematics.tab", b"X..C2", b"X..C3"), "X..C3 is in no axis table"),
     "an error on an axis": (("kinematics.tab", b"MachAxis Y", b"MachAxis Y    1.0"), "neither COORD nor COMPTAB"),
     "a foreign column": (("AXIS-X.COM", b" C2 ", b" 2=F()"), "not that of the axis itself"),

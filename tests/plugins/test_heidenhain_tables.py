@@ -131,19 +131,19 @@ def test_values_beyond_the_columns_are_refused() -> None:
 
 BROKEN = {
     "cut short": (COM.replace(b"[END]\n", b""), "[END] is missing"),
-    "a row gone": (COM.replace(COM.splitlines(keepends=True)[3], b""), "row 2 where 1 should be"),
+    "a row gone": (COM.replace(COM.splitlines(keepends=True)[3], b""), "row 2 instead of row 1"),
     "descending": (COM.replace(b"+10.0000", b"-20.0000"), "must ascend"),
     "a decimal comma": (COM.replace(b"+0.0009", b"+0,0009"), "a decimal comma under X"),
     "an empty cell": (COM.replace(b"+0.0009", b"       "), "nothing under X"),
-    "a word": (COM.replace(b"+0.0009", b"+0.OOO9"), "is no number"),
-    "not finite": (COM.replace(b"+0.0009", b"nan    "), "is no number"),
+    "a word": (COM.replace(b"+0.0009", b"+0.OOO9"), "is not a number"),
+    "not finite": (COM.replace(b"+0.0009", b"nan    "), "is not a number"),
     "shifted": (COM.replace(b"1    +0.0000       +0.0021 ", b"1    +0.0000      +0.0021  "), "column"),
     "a cell too many": (COM.replace(b"+0.0010       \n", b"+0.0010 +0.0010\n"), "more cells than"),
     "a tab": (COM.replace(b"1    +0.0000", b"1\t+0.0000"), "a tab"),
     "inches": (COM.replace(b"COM MM", b"COM INCH"), "the unit is INCH"),
     "no header": (COM.replace(b"NR   AXISPOS", b"     AXISPOS"), "no line of column names"),
-    "an unknown axis": (COM.replace(b"       Z  ", b"       Q  "), "is no axis"),
-    "a column twice": (COM.replace(b"       Z  ", b"       X  "), "there twice"),
+    "an unknown axis": (COM.replace(b"       Z  ", b"       Q  "), "is not an axis"),
+    "a column twice": (COM.replace(b"       Z  ", b"       X  "), "appears twice"),
     "micrometres": (COM.replace(b"+0.0040", b"+4.0000"), "not um"),
     "one row": (b"".join([*COM.splitlines(keepends=True)[:3], b"[END]\n"]), "1 points"),
     "empty": (b"", "is empty"),
@@ -151,7 +151,7 @@ BROKEN = {
 BROKEN_CMA = {
     "no active line": (CMA.replace(b"*", b" "), "0 lines are marked"),
     "a file that is not there": (CMA.replace(b"AXIS_X.COM", b"AXIS_Y.COM"), "AXIS_Y.COM of axis X is missing"),
-    "an unknown axis": (CMA.replace(b"X     ", b"Q     ", 1), "is no axis"),
+    "an unknown axis": (CMA.replace(b"X     ", b"Q     ", 1), "is not an axis"),
     "two active lines": (CMA.replace(b"[END]", b"1    *      AXIS_X.COM\n[END]"), "2 lines are marked"),
 }
 
@@ -196,8 +196,9 @@ def test_play_that_is_left_is_said_with_the_setting_that_takes_it_up() -> None:
     curves = {"positive": (0.004, -0.002), "negative": (0.007, 0.003)}
     effects = tuple(Effect("EXX", curve, PiecewiseLinear((-200.0, 300.0), way)) for way, curve in curves.items())
     machine = single_error("EXX").replace(effects=effects)
-    for setting, left in (("off", ["What the way changes", "The mean of both ways"]), ("on", [])):
+    begins = ["Errors that depend on the direction of motion", "The values written are the mean of both directions"]
+    for setting, left in (("off", begins), ("on", [])):
         settings = {"sign": "error", "backlash": setting}
         request = Request(machine, ranges_of(machine), 0.0, 0.001, settings)
-        found = [note for note in CONTROL.write(request).notes if " way" in note]
+        found = [note for note in CONTROL.write(request).notes if "direction" in note]
         assert [note[: len(begin)] for note, begin in zip(found, left, strict=True)] == left

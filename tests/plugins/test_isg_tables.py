@@ -88,7 +88,7 @@ BROKEN = {
 BROKEN_CONFIG = {
     "an unknown name": (CONFIG.replace(b"filter_steps ", b"filter_stops "), "70468"),
     "letters of two axes": (CONFIG + b"XY 5\n", "the name 'XY' is not known (error 70468)"),
-    "a name twice": (CONFIG + b"X 9\n", "X is there twice"),
+    "a name twice": (CONFIG + b"X 9\n", "X appears twice"),
     "no value": (CONFIG + b"Y\n", "has no value"),
     "other kinematics": (CONFIG.replace(b"axes          0", b"axes          1"), "workpiece_axes is 1"),
     "no such file": (CONFIG.replace(b"volcomp0", b"volcomp9"), "volcomp9.csv is missing"),

@@ -300,7 +300,7 @@ def test_letters_that_do_not_tell_degrees_from_millimetres() -> None:
 
 
 def test_a_scheme_that_takes_more_tables_than_there_are() -> None:
-    with pytest.raises(RefusedError, match="9 tables, and the control has 8") as caught:
+    with pytest.raises(RefusedError, match="9 tables, but the control has 8") as caught:
         made(single_error("EXX"), scheme="poly25", model="828D")
     assert caught.value.code == "NCF484"
 

@@ -42,7 +42,7 @@ HEAD = (
     "before max / rms",
     "after max / rms",
     "at least",
-    "most is left at",
+    "the largest error remains at",
 )
 
 

@@ -47,9 +47,9 @@ def words(error: NcfixError) -> str:
 @pytest.mark.parametrize(
     ("control", "said"),
     [
-        ("linuxcnc", "Straightness, squareness, angles"),
+        ("linuxcnc", "straightness, squareness, angular errors"),
         ("heidenhain", "cannot follow angular errors"),
-        ("fanuc-pitch", "The way back needs a table of its own"),
+        ("fanuc-pitch", "The opposite direction needs its own table"),
         ("gcode", "is not corrected"),
     ],
 )
@@ -69,14 +69,14 @@ def test_a_model_that_the_tables_would_make_worse() -> None:
     with pytest.raises(RefusedError) as caught:
         exported("fanuc", turning)
     assert caught.value.code == "NCF490"
-    assert "more error than there is without them" in words(caught.value)
+    assert "would increase the error" in words(caught.value)
 
 
 def test_ranges_beyond_the_travel() -> None:
     with pytest.raises(UsageError) as caught:
         ranges_of(single_error("EXX"), {"X": (-200.0, 301.0)})
     assert caught.value.code == "NCF483"
-    assert "beyond its travel" in words(caught.value)
+    assert "exceeds its travel" in words(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_values_beyond_the_format(control: str) -> None:
     with pytest.raises(RefusedError) as caught:
         exported(control, machine)
     assert caught.value.code == "NCF484"
-    assert "is the error in mm?" in words(caught.value)
+    assert "check that the error is in mm" in words(caught.value)
 
 
 def test_corrections_beyond_what_the_machine_allows() -> None:
@@ -140,7 +140,7 @@ def test_a_hand_edited_file_with_a_wrong_count() -> None:
     found = json.loads(files["volume.json"])
     found["records"][0]["data"].append(0)
     files["volume.json"] = json.dumps(found).encode()
-    with pytest.raises(ConfigError, match="values and says"):
+    with pytest.raises(ConfigError, match="values, but states"):
         emulate(get_control("fanuc"), files, single_error("EXX"), "tables")
 
 
@@ -152,7 +152,7 @@ def test_a_file_that_is_gone() -> None:
 
 
 def test_a_wrong_setting_is_named_with_those_that_there_are() -> None:
-    with pytest.raises(UsageError, match="no option 'sing'") as caught:
+    with pytest.raises(UsageError, match="no setting 'sing'") as caught:
         get_control("fanuc").settings({"sing": "error"})
     assert "sign" in words(caught.value)
 
@@ -195,14 +195,14 @@ def test_tables_of_an_endless_axis_say_from_where_it_is_counted(control: str) ->
     """On a control that counts to 360 degree the value at 180 would be held for half of the turn."""
     turning = loads(TABLE).replace(effects=(Effect("ECC", (0.0, 4e-5), Fourier((1,))),))
     notes = " ".join(exported(control, turning, **ENDLESS.get(control, {})).notes)
-    assert "C turns without end and these tables do not repeat" in notes
+    assert "C has no end of travel, and these tables do not repeat" in notes
     assert "from -180 to 180 degree" in notes
 
 
 @pytest.mark.parametrize("control", ["siemens", "gcode"])
 def test_what_repeats_after_a_turn_says_nothing(control: str) -> None:
     turning = loads(TABLE).replace(effects=(Effect("ECC", (0.0, 4e-5), Fourier((1,))),))
-    assert "without end" not in " ".join(exported(control, turning).notes)
+    assert "no end of travel" not in " ".join(exported(control, turning).notes)
 
 
 def test_a_perfect_machine_gets_tables_that_do_nothing() -> None:

@@ -66,19 +66,19 @@ BROKEN = {
     "tnc306": (b"DATUM POINT 0\nY = F(Z)\n0 Z0 Y0\n", "should begin with the line of rule"),
     "g10": (b"G10L50\nN1 R1\n", "end with that of end"),
     "isg-csv": (b"X EXX\n0 0 0\n", "3 numbers under 2 names"),
-    "elmo": (ELMO.replace(b"3\t4\n", b""), "1 rows, and Table dimensions says 2 of 2"),
-    "weihong": (b"unit = mm\n[X]\n0, 0\n", "is no line of"),
+    "elmo": (ELMO.replace(b"3\t4\n", b""), "1 rows, but Table dimensions states 2 of 2"),
+    "weihong": (b"unit = mm\n[X]\n0, 0\n", "is not a line of"),
     "weihong ": (b"unit = mm\n[X]\n1, 0, 0\n1, 0, 0\n", "must ascend"),
     "hexagon": (b"STARTW\n10=10.1\n", "end with that of end"),
-    "centroid": (b"24 0 0 0\n", "is no line of"),
+    "centroid": (b"24 0 0 0\n", "is not a line of"),
     "rtl": (b"Target-count: 2\nRun-count: 1\nDEVIATIONS::\nRun Target Data:\n1 1 0.0\n", "1 deviations, 2 expected"),
-    "etalon": (b"[EXY]\nGridpoints = {\n0 one\n}\n", "is no line of"),
-    "pmac": (b"DEFINE COMP ten, #1\n", "is no line of"),
-    "pmac ": (b"DEFINE COMP 3, #1, #1, 6000\n16 8\n", "2 entries follow, and the line says 3"),
+    "etalon": (b"[EXY]\nGridpoints = {\n0 one\n}\n", "is not a line of"),
+    "pmac": (b"DEFINE COMP ten, #1\n", "is not a line of"),
+    "pmac ": (b"DEFINE COMP 3, #1, #1, 6000\n16 8\n", "2 entries follow, but the line states 3"),
     "pmac  ": (b"#2DEFINE COMP 2, 6000\n16\n8.5\n", "whole numbers"),
     "pmac   ": (b"#2DEFINE COMP 2, 6000\n16\n8\n", "the last entry is 8"),
-    "isg-list": (b"X\n", "is no line of"),
-    "ini": (b"[A]\nb c\n", "is no line of"),
+    "isg-list": (b"X\n", "is not a line of"),
+    "ini": (b"[A]\nb c\n", "is not a line of"),
 }
 
 
@@ -121,7 +121,7 @@ def test_a_form_of_a_plugin() -> None:
     document, remarks = read_form(form, "x", b"#AXIS[Y]\n1 2\n1;2\n")
     assert document.sections("axis") == {"Y": [(1.0, 2.0)]}
     assert [(each.text, each.hint) for each in remarks.wrong] == [
-        ("is no line of Own's table", "a line is one of: axis, row")
+        ("is not a line of Own's table", "possible lines: axis, row")
     ]
 
 

@@ -56,7 +56,7 @@ def test_controls_take_it_off(control: str, topology: str, size: float) -> None:
     made = exported(control, with_play(size, topology=topology))
     assert made.left.before.max() == pytest.approx(0.002, abs=1e-12)
     assert made.left.after.max() < 1.1e-4  # a tenth of a micrometre is a detection unit
-    assert not any("(play) is left" in note for note in made.notes)
+    assert not any("(play) are not corrected" in note for note in made.notes)
     assert not made.messages
 
 
@@ -85,7 +85,7 @@ def test_golden_axis_list() -> None:
 def test_it_can_be_left(control: str) -> None:
     made = exported(control, with_play(0.004), play="no")
     assert made.left.after.max() == pytest.approx(0.002, abs=1e-12)
-    assert any("(play) is left: up to 2.00 um" in note for note in made.notes)
+    assert any("(play) are not corrected: up to 2.00 um" in note for note in made.notes)
 
 
 @pytest.mark.parametrize("home", ["", "X"])
@@ -104,12 +104,12 @@ def test_play_of_rotary_axes_and_across_is_said() -> None:
     machine = with_play(0.004, name="EYX")
     assert not reversals(machine, ranges_of(machine), 0.0, 0.001, 10)
     assert list(reversal_note(machine, ranges_of(machine), 0.0)) == [
-        "What the way changes in which an axis moves (play) is left: up to 2.00 um."
+        "Errors that depend on the direction of motion (play) are not corrected: up to 2.00 um remain."
     ]
 
 
 FANUC_BROKEN = {
-    "another parameter": (b"N01851", b"N01850", "parameter 1850 is not for here"),
+    "another parameter": (b"N01851", b"N01850", "parameter 1850 does not belong in this file"),
     "a fraction": (b"P-40", b"P-40.5", "whole numbers"),
     "too large": (b"P-40", b"P-40000", "whole numbers from -9999"),
     "a fourth axis": (b";\n%", b"A4P7;\n%", "axes 1 to 3"),
@@ -135,7 +135,7 @@ ISG_BROKEN = {
     "a comma": (b"table[0].pos            20", b"table[0].pos            20,5", "a whole number of tenths"),
     "too large": (b"table[0].pos            20", b"table[0].pos            20000", "which no machine has"),
     "backwards": (b"setpoint       -2000000", b"setpoint       4000000", "must ascend"),
-    "twice": (b"kw.ssfk.unit                    1", b"kw.ssfk.unit  1\nkw.ssfk.unit 1", "is there twice"),
+    "twice": (b"kw.ssfk.unit                    1", b"kw.ssfk.unit  1\nkw.ssfk.unit 1", "appears twice"),
     "a point cut off": (b"kw.ssfk.table[1].neg            -20\n", b"", "without setpoint, pos and neg"),
 }
 

@@ -171,7 +171,9 @@ def simulate(
     from ncfix.measure.measurement import Measurement
 
     if isinstance(subject, Measurement) and setup is not None:
-        raise UsageError.of("NCF025", "a set-up is for a program", hint="a plan has columns for states")
+        raise UsageError.of(
+            "NCF025", "a setup is for a program, not for a measurement plan", hint="a plan has columns for inputs"
+        )
     if not isinstance(subject, Measurement) and (faults is not None or seed != 0):
         raise UsageError.of("NCF025", "faults and seed are for a measurement plan, not for a program")
     known = as_machine(machine)

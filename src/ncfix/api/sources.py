@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 PathName = str | os.PathLike[str]
 Value = TypeVar("Value")
-ONE_SOURCE = "a path or a text is needed, and not both"
+ONE_SOURCE = "give a path or a text, not both"
 
 
 def load_machine(source: PathName | None = None, *, text: str | None = None) -> Machine:
@@ -95,7 +95,7 @@ def sound_machine(machine: Machine | PathName, force: bool) -> Machine:
     known = as_machine(machine)
     if not force:
         path = os.fspath(machine) if isinstance(machine, (str, os.PathLike)) else known.name
-        required(known, path, "force=True makes it all the same")
+        required(known, path, "force=True uses the machine as it is")
     return known
 
 
@@ -178,7 +178,7 @@ def as_measurements(measured: Measured | Sequence[Measured], machine: Machine) -
 
     several = [measured] if isinstance(measured, (str, os.PathLike, Measurement)) else list(measured)
     if not several:
-        raise UsageError.of("NCF025", "no measurement is given", hint="one or more of them")
+        raise UsageError.of("NCF025", "no measurement is given", hint="give one or more measurements")
     each_once(paths_of(each for each in several if not isinstance(each, Measurement)))
     for number, each in enumerate(several):
         if isinstance(each, Measurement) and any(each is other for other in several[:number]):

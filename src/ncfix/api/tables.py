@@ -220,7 +220,7 @@ def report(
     from ncfix.reports.rendering import form_of
 
     if not sources:
-        raise UsageError.of("NCF025", "a report is made of something", hint="machines, diagnoses or results")
+        raise UsageError.of("NCF025", "nothing is given for the report", hint="give machines, diagnoses or results")
     check_writable(output, force, sources)
     render = form_of(os.fspath(output) if output is not None else f"page{form}")
     found = [section for source in sources for section in _sections(source)]

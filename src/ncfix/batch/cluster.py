@@ -58,7 +58,7 @@ class ClusterExecutor(Executor):
         try:
             return connect(f"tcp://{place}", timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
-            hint = "start it, or name another one; --resume goes on with a batch that has begun"
+            hint = "start it, or name another one; --resume continues a batch that has begun"
             raise UsageError.of("NCF029", f"there is no scheduler at {self.address}", hint=hint) from error
 
     def _check_workers(self) -> None:
@@ -69,8 +69,8 @@ class ClusterExecutor(Executor):
         others = {found for found in versions.values() if found != __version__}
         if others:
             self.client.close()
-            text = f"workers of {self.address} have ncfix {', '.join(sorted(others))}, and this is {__version__}"
-            raise UsageError.of("NCF029", text, hint="install the same on all of them")
+            text = f"workers of {self.address} have ncfix {', '.join(sorted(others))}, but this is {__version__}"
+            raise UsageError.of("NCF029", text, hint="install the same version on all of them")
 
     def submit(self, work: Callable[..., Result], /, *given: Any, **named: Any) -> Future[Result]:
         """Submit a task; its future raises `BrokenExecutor` if several workers died over it, or the cluster is gone."""

@@ -223,7 +223,7 @@ def _locked(path: str) -> Iterator[None]:
             if not _is_free(handle.fileno()):
                 if monotonic() > until:
                     text = "another ncfix writes into this folder"
-                    raise UsageError.of("NCF026", text, Place(path), "wait until it is done, or another -o")
+                    raise UsageError.of("NCF026", text, Place(path), "wait until it has ended, or give another -o")
                 sleep(0.05)
             elif os.path.exists(path) and os.path.samestat(os.fstat(handle.fileno()), os.stat(path)):
                 yield

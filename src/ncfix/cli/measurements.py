@@ -202,13 +202,17 @@ def _print(calibration: Calibration, over: Prediction) -> None:
         unit = "urad" if row["component"][1] in "ABC" else "um"
         known = [f"{name} {row[key]:.1f}" for key, name in FIGURES.items() if row[key] == row[key]]
         own = machine.is_positioning(row["component"])
-        few = f" ({row['runs']} of the {FULL_TEST} runs that it asks for)" if own and row["runs"] < FULL_TEST else ""
+        few = (
+            f" ({row['runs']} of the {FULL_TEST} runs that the standard requires)"
+            if own and row["runs"] < FULL_TEST
+            else ""
+        )
         norm = "ISO 230-2" if own else "as in ISO 230-2"
         console.say(f"{row['component']} set {row['name']}, {norm}: {', '.join(known)} {unit}{few}")
-    held = "; what is held counts as known" if any(map(math.isnan, calibration.sigma.tolist())) else ""
+    held = "; held coefficients count as known" if any(map(math.isnan, calibration.sigma.tolist())) else ""
     figures = f"{over.worst_um:.2f} um at worst, {over.rms_um:.2f} um rms"
-    console.say(f"sigma of the tip error over the travels: {figures}{held}")
-    rms = f"rms {calibration.before_um:.2f} um before, {calibration.after_um:.2f} um after"
+    console.say(f"standard deviation of the predicted tip error over the travels: {figures}{held}")
+    rms = f"residuals {calibration.before_um:.2f} um rms before, {calibration.after_um:.2f} um rms after"
     console.say(f"{'only angles' if math.isnan(calibration.before_um) else rms}; {_noise(calibration)}")
 
 
@@ -229,7 +233,7 @@ def _noise(calibration: Calibration) -> str:
     freedom = f"{calibration.estimate.freedom} degrees of freedom"
     if calibration.problem.noise_known:
         return f"reduced chi-square {calibration.chi_square:.3f} with {freedom}"
-    return f"noise neither given nor to be told from repeats: sigmas are those of the residuals ({freedom})"
+    return f"noise neither stated nor known from repeats: sigmas are from the residuals ({freedom})"
 
 
 def _say_bar(bar: dict[str, Any]) -> None:
@@ -348,15 +352,18 @@ def plan(
 def _say(planned: Planned, *, separated: bool) -> None:
     """Report what the poses cannot determine, and how well the tip error will be known if that was optimised."""
     if planned.unseen:
-        console.say(f"no pose of this kind tells {', '.join(planned.unseen)} from the rest")
+        console.say(
+            f"no pose of this kind distinguishes these errors from the other unknowns: {', '.join(planned.unseen)}"
+        )
     if not separated:
         console.say(
-            f"tip error known to {planned.worst_um:.2f} um at worst per um of noise, {planned.mean_um:.2f} um rms"
+            f"standard deviation of the tip error, per um of noise: {planned.worst_um:.2f} um at worst, "
+            f"{planned.mean_um:.2f} um rms"
         )
     if planned.open:
-        console.say(f"nearly open is a combination of {', '.join(planned.open)}")
+        console.say(f"hardly determined is a combination of {', '.join(planned.open)}")
         console.say(
-            "more poses may tell it, another kind of measurement or another tool; or seek fewer effects (--effects)"
+            "use more poses, another kind of measurement or another tool length, or estimate fewer effects (--effects)"
         )
 
 
@@ -454,7 +461,7 @@ def diagnose(
         console.put(text(diagnosis))
         if output and written is None:
             torn = diagnosis.mistake is not None and diagnosis.mistake.torn
-            why = "the readings may be wrong instead" if torn else "there is nothing to add to the model"
+            why = "the readings may be wrong instead" if torn else "there is no effect to add to the model"
             console.say(f"no machine file was written: {why}")
     return ExitCode.FINDINGS if check and diagnosis.verdict != NOTHING else ExitCode.DONE
 

@@ -190,7 +190,10 @@ def tell(made: Exported, control: Control, as_json: bool) -> None:
     console.table(("tip error, um", "max", "rms", "mean"), rows)
     pose = " ".join(f"{name}{value:g}" for name, value in figures["after"]["at"].items())
     limits = made.limits()
-    console.put(f"class {made.reaches}; {limits['tables']} tables, {limits['points']} points; most is left at {pose}\n")
+    console.put(
+        f"class {made.reaches}; {limits['tables']} tables, {limits['points']} points; the largest error "
+        f"remains at {pose}\n"
+    )
     if program is not None:
         for when, error in (("before", program.before), ("after", program.after)):
             console.put(f"{program.path} {when}: {console.error_figures(error)}\n")

@@ -26,7 +26,7 @@ STRANGE = 3e3
 """Implausible residual, um rms per mm of a large location error of this machine (`plausible.much`)."""
 MOST_VALUES = 1800
 """Largest number of values of a diagnosis: work grows with their third power, memory with the second."""
-STAYED = "`ncfix plan` proposes poses; a test of drift needs a column time_s or temperatures"
+STAYED = "`ncfix plan` proposes poses; a test of drift needs a column time_s, or temperatures"
 CONTRADICTION = 1e-6
 """Probability by chance below which files contradict each other."""
 MISSTATED = 2.0
@@ -59,7 +59,10 @@ def _drawn(measurement: Measurement, most: int) -> Measurement:
     chosen = np.zeros(len(counts), dtype=bool)
     chosen[order] = np.cumsum(counts[order]) - counts[order] < most
     rows = measurement.rows(chosen[state])
-    text = f"{measurement.path}: of {len(measurement)} rows {len(rows)} were drawn, more cannot be weighed together"
+    text = (
+        f"{measurement.path}: {len(rows)} of {len(measurement)} rows were used, drawn at random; more cannot be "
+        "evaluated together"
+    )
     return replace(rows, remarks=(*measurement.remarks, Message("NCF660", text)))
 
 
@@ -68,10 +71,13 @@ def before(measurements: Sequence[Measurement], machine: Machine) -> None:
     q = np.concatenate([each.positions(machine) for each in measurements])
     direct = any(each.kind in ("axis", "length") for each in measurements)
     if not direct and not any(each.stays for each in measurements) and float(np.ptp(q, axis=0).max(initial=0.0)) < 1e-3:
-        raise UsageError.of("NCF651", f"all {len(q)} rows are of one pose", hint=STAYED)
+        raise UsageError.of("NCF651", f"all {len(q)} rows have the same pose", hint=STAYED)
     seen = Problem.of(measurements, machine, _nothing(machine))
     if not any(each.noise_known for each in seen.observations) and len(q) < NEIGHBOURS:
-        text = f"neither repeats nor a noise_um line, and {len(q)} rows are too few to tell the noise from neighbours"
+        text = (
+            f"there are no repeats and no noise_um line, and {len(q)} rows are too few to estimate the noise from "
+            "neighbouring poses"
+        )
         raise UsageError.of("NCF652", text, hint="repeat ten poses a few times, or state the noise in the header")
 
 
@@ -84,15 +90,17 @@ def sensible(measurements: Sequence[Measurement], machine: Machine) -> None:
     now = misfit(measurements, machine)
     free = now.free
     if free > STRANGE * max(much(machine, f"EX0{axis.name}") for axis in machine.axes):
-        text = f"{free:.0f} um rms are left after the set-up was fitted"
-        raise UsageError.of("NCF654", text, hint="a measurement of another machine, or exchanged columns?")
+        text = f"after fitting the set-up, {free:.0f} um rms remain"
+        raise UsageError.of(
+            "NCF654", text, hint="check whether it is another machine, and whether columns are exchanged"
+        )
 
 
 def enough(data: ResidualData) -> None:
     """Refuse too few values for the unknowns. Raises `UsageError` NCF650."""
     free = int(np.linalg.matrix_rank(data.base))
     if len(data.y) < free + SPARE:
-        text = f"{len(data.y)} values, and {free} unknowns of set-up and constants need {free + SPARE} or more"
+        text = f"{len(data.y)} values are too few: {free} unknowns of set-up and constants need at least {free + SPARE}"
         raise UsageError.of("NCF650", text, hint="measure more poses")
 
 
@@ -120,7 +128,7 @@ def agreeing(data: ResidualData, residual: Array, sigma: float, since: int = 0) 
             pairs += 1
     if pairs > SPARE and float(chdtrc(pairs, apart)) < CONTRADICTION and apart > 4 * pairs:
         text = (
-            f"{pairs} values were measured by two files and differ by {np.sqrt(2 * apart / pairs):.1f} times the noise"
+            f"{pairs} values were measured in two files, and differ by {np.sqrt(2 * apart / pairs):.1f} times the noise"
         )
         raise UsageError.of("NCF656", text, hint="diagnose the files one by one")
 
@@ -133,7 +141,7 @@ def _misstated(data: ResidualData) -> list[Message]:
     seen = float(np.sqrt(squares / freedom))
     if 1 / MISSTATED < seen / data.sigma < MISSTATED:
         return []
-    return [Message("NCF659", f"the files state {data.sigma:.2g} um of noise, repeats scatter by {seen:.2g} um")]
+    return [Message("NCF659", f"the files state a noise of {data.sigma:.2g} um, but repeats scatter by {seen:.2g} um")]
 
 
 def _steady(data: ResidualData) -> Iterator[Message]:
@@ -141,7 +149,7 @@ def _steady(data: ResidualData) -> Iterator[Message]:
     for each in data.problem.observations:
         seen = float(np.median(each.um * each.sigma))
         if each.noise_known and not (each.noise_stated or each.turns.any()) and 0 < seen < STEADY_UM:
-            text = f"{each.measurement.path}: repeats scatter by {seen:.2g} um, no machine tool comes back so well"
+            text = f"{each.measurement.path}: repeats scatter by {seen:.2g} um only; no machine tool repeats so well"
             yield Message("NCF616", text, hint="are the values in metres or inches?")
 
 
@@ -150,13 +158,13 @@ def remarks(data: ResidualData, unheard_of: Sequence[str]) -> list[Message]:
     found = []
     for axis in data.machine.axes:
         if silent := data.unstated(axis):
-            text = f"{', '.join(silent)} does not say from where {axis.name} came, other files do"
-            found.append(Message("NCF658", f"{text}: its backlash and play are not among the candidates"))
+            text = f"{', '.join(silent)} does not state the direction of approach of {axis.name}, but other files do"
+            found.append(Message("NCF658", f"{text}; its backlash is not among the candidates"))
     stated = {name for each in data.measurements for name in each.columns if name.startswith("dir_")}
     fixed = [axis.name for axis in data.machine.axes if data.measured.moved(axis) and f"dir_{axis.name}" in stated]
     fixed = [name for name in fixed if np.ptp(data.column(f"dir_{name}")) == 0]
     if fixed:
-        text = f"{', '.join(fixed)} came from one side only: backlash and play of {'it' if len(fixed) == 1 else 'them'}"
+        text = f"{', '.join(fixed)} approached from one side only: backlash of {'it' if len(fixed) == 1 else 'them'}"
         found.append(Message("NCF653", f"{text} cannot show"))
     found += [*_misstated(data), *_steady(data)]
     found += [each for of in data.measurements for each in of.remarks if each.code == "NCF660"]

@@ -89,8 +89,8 @@ def _temperature(
     scales = [each for each, _ in shares.values()]
     warm = "colder" if mean < 0 else "warmer"
     title = (
-        f"the scales of {' and '.join(sorted(shares))} are all {1e6 * mean:+.1f} um/m off, as if the machine "
-        f"were {abs(mean) / STEEL:.1f} K {warm} than the part, both of steel"
+        f"the scales of {' and '.join(sorted(shares))} all have an error of {1e6 * mean:+.1f} um/m, as if the "
+        f"machine were {abs(mean) / STEEL:.1f} K {warm} than the part, both of steel"
     )
     names = {each.candidate.name for each in scales}
     owner = Candidate("temperature", title, "", "temperature", (), (), remedy="measure and cut at one temperature")

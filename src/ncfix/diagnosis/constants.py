@@ -98,8 +98,8 @@ class ConstantsVerdict:
 
         A probe cannot distinguish an axis that has moved from a wrong axis point in the file.
         """
-        anew = "use the new machine file, or calibrate the machine anew"
-        point = f"; if the control has the point of {probed} elsewhere than the old file, "
+        anew = "use the new machine file, or calibrate the machine again"
+        point = f"; if the control has another point of {probed} than the old file, "
         point += "correct the point in that file instead"
         return anew + point if probed else anew
 

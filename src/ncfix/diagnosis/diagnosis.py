@@ -75,7 +75,7 @@ PLAUSIBLE_UM = 4.0
 """Largest plausible background of small effects, um rms; a larger one is a pattern that was taken for background."""
 CLEAR = float(np.log(1e6))
 """Log odds of the unnamed alternatives from which on they are not noise, however poorly the noise is known."""
-NO_PATTERN = "something that follows no pattern that was looked for"
+NO_PATTERN = "something without a pattern that ncfix knows"
 
 
 @frozen(repr=False, slots=False)
@@ -300,7 +300,7 @@ def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: fl
         return ()
     p_value = min(constants.p_value, float(np.exp(-constants.odds)))
     if constants.whole:
-        title = f"constants of the machine file: all {constants.freedom} that can be told are off together"
+        title = f"constants of the machine file: all {constants.freedom} that the data determine are wrong together"
         owner = Candidate("constants of the file", title, "", CONSTANT_FAMILY, (), (), remedy=constants.remedy())
         return (EffectFinding(owner, constants.odds, p_value, (), constants.size_um, (), constants.shown),)
     probed = all(each.kind == "probe" for each in case.data.measurements)
@@ -310,7 +310,7 @@ def _off(case: Case, constants: ConstantsVerdict, machine: Machine, named_um: fl
     for each in constants.moved:
         effect = effects[each.name]
         title = f"constant of the machine file: {component_title(effect.name, case.data.machine.axis(effect.joint))}"
-        title += ", with the other sign" if each.turned else ""
+        title += ", with the opposite sign" if each.turned else ""
         place = effect.location and effect.name[1] in "XYZ" and effect.joint in rotary
         remedy = constants.remedy(effect.joint if place else "")
         owner = Candidate(f"constant {each.name}", title, effect.joint, CONSTANT_FAMILY, (), (), remedy=remedy)
@@ -380,7 +380,7 @@ def diagnose(
     measurements = checks.bounded([with_motion(each, machine) for each in measurements])
     if since:
         if len(measurements) < 2:
-            raise UsageError.of("NCF650", "one file: what changed since takes one of each date")
+            raise UsageError.of("NCF650", "only one file is given, but --since needs files of two dates")
         return _explained(measurements, machine, refused, len(measurements) - 1)
     wrong = find(measurements, machine, refused) or in_usual_unit(measurements, machine, refused)
     if wrong is None:

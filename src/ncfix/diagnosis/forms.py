@@ -60,10 +60,10 @@ LEAD_SHARE = 0.5
 it has no lever in these data."""
 UNNAMED_FAMILY = "unnamed"
 """Family of the unnamed alternatives."""
-POSE = Candidate("unknown by pose", "something that depends on where the axes are", "", UNNAMED_FAMILY, (), ())
-TIME = Candidate("unknown by time", "something that happens in the course of time", "", UNNAMED_FAMILY, (), ())
+POSE = Candidate("unknown by pose", "something that depends on the positions of the axes", "", UNNAMED_FAMILY, (), ())
+TIME = Candidate("unknown by time", "something that changes with time", "", UNNAMED_FAMILY, (), ())
 DIRECTION = Candidate(
-    "unknown by way", "something that depends on from where the axes came", "", UNNAMED_FAMILY, (), ()
+    "unknown by way", "something that depends on the directions of approach", "", UNNAMED_FAMILY, (), ()
 )
 POSE_LENGTHS = (0.8, 1.6)
 """Correlation lengths of a smooth field of all axes, in units of half their travels."""
@@ -343,7 +343,7 @@ def _joint_forms(data: ResidualData) -> Iterator[EffectForm | None]:
     shown = (design @ loading for design, (_, _, loading) in zip(designs, parts, strict=True))
     for axis, what, components in sorts:
         own = [side_by_side([next(shown) for _ in component]) for component in components]
-        yield combined_form(data, _something(axis, f"something of {axis.name}", what), own)
+        yield combined_form(data, _something(axis, f"an error of {axis.name}", what), own)
         for component, part in zip(components, own, strict=True):
             effects = zero([Effect(name, (), **options) for name, options, _ in component])
             yield combined_form(data, replace(_something(axis, component[0][0], what), effects=effects), [part])

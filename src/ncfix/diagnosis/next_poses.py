@@ -41,8 +41,8 @@ FEWER = 0.8
 """Poses that need more travel or tools must reduce the probability of an undecided result to this share."""
 MIN_CHANCE_GAIN = 0.05
 """Smallest increase of the chance that a single name is left, for which poses are proposed."""
-SAME_PATTERN = "wherever these axes go, and with other tools, they show nearly the same pattern"
-ALIGNED = "the part was aligned: no poses tell them apart then; measure a square, or both diagonals with a ball-bar"
+SAME_PATTERN = "at all positions of these axes and with other tools, they give nearly the same pattern"
+ALIGNED = "the part was aligned, so no poses distinguish them; measure a square, or both diagonals with a ball-bar"
 """Reasons why no poses are proposed."""
 OFFERED = 320
 """Number of poses on offer."""
@@ -185,11 +185,11 @@ def _reason(evidence: Evidence, groups: Sequence[EffectForm]) -> str:
     data = evidence.background.data
     turning = {any(effect.rotational for effect in group.owner.effects[:1]) for group in groups}
     if len(set(np.round(data.column("tool_length"), 3).tolist())) == 1 and len(turning) == 2:
-        return "one tool length: a shift and a tilt look alike where the lever is always the same"
+        return "one tool length only: with the same lever at all poses, a displacement and a tilt look alike"
     own = groups[0].owner.axis
     if own and f"dir_{own}" not in data.measured.columns:
-        return f"{own} came from one side only, so nothing shows what depends on its direction"
-    return "at these poses they show nearly the same pattern"
+        return f"{own} was approached from one side only, so errors that depend on its direction do not show"
+    return "at these poses they give nearly the same pattern"
 
 
 def as_objects(plan: Measurement) -> list[dict[str, float]]:
@@ -275,7 +275,7 @@ def new_tools(plan: Measurement, used: Array) -> tuple[float, ...]:
 def marked(plan: Measurement, beyond: Sequence[str], tools: Sequence[float] = (), strays: bool = False) -> Measurement:
     """The plan with a `note` header that warns of travels beyond the measured ones and of new tools."""
     far = [*beyond, *(["the tool tip"] if strays else [])]
-    said = [f"{', '.join(far)} beyond the travels measured so far, mind the clearance"] if far else []
+    said = [f"{', '.join(far)} beyond the travels measured so far: check the clearance"] if far else []
     lengths = " and ".join(f"{each:g} mm" for each in tools)
-    said += [f"tool of {lengths}: or one that differs as much, with its own length in the file"] if tools else []
+    said += [f"tool of {lengths}: or another one that differs as much, with its length in the file"] if tools else []
     return plan.with_header("note", "; ".join(said)) if said else plan

@@ -18,7 +18,7 @@ from ncfix.diagnosis.selection import findable_in_words, shows_hardly_anything
 from ncfix.machine import Machine
 from ncfix.measure.calibrate import untold
 
-HEAD = ("rung", "left, um", "held out", "share", "log odds", "found")
+HEAD = ("rung", "residual, um", "held out", "share", "log odds", "found")
 """Headings of the table of the ladder."""
 LEAST_P = 1e-300
 """Smallest probability that is printed."""
@@ -27,22 +27,22 @@ SHOWN = 0.05
 NEARLY = 0.925
 """Chances above this are called nearly sure; others are rounded to five in a hundred."""
 SAID = {
-    NOTHING: "nothing is missing that stands out of the noise",
-    FOUND: "the model lacks something that has a name",
-    AMBIGUOUS: "the model lacks something, and these data leave more than one name for it",
-    UNKNOWN: "the model lacks something that is not in the catalogue",
+    NOTHING: "the model lacks nothing that exceeds the noise",
+    FOUND: "the model lacks effects that could be named",
+    AMBIGUOUS: "the model lacks an effect, and these data agree with more than one name for it",
+    UNKNOWN: "the model lacks an effect that is not in the catalogue",
 }
-MISTAKEN = "a mistake of software or set-up explains the data"
+MISTAKEN = "a mistake in the software, the files or the set-up explains the data"
 CHANGED = {
-    NOTHING: "nothing changed that stands out of the noise",
-    FOUND: "something changed that has a name",
-    AMBIGUOUS: "something changed, and these data leave more than one name for it",
-    UNKNOWN: "something changed that is not in the catalogue",
+    NOTHING: "nothing has changed that exceeds the noise",
+    FOUND: "the changes could be named",
+    AMBIGUOUS: "something has changed, and these data agree with more than one name for it",
+    UNKNOWN: "something has changed that is not in the catalogue",
 }
 """Verdicts of a comparison of two dates."""
 NOISE = {
     "repeats": "from repeats",
-    "given": "as the files state it",
+    "given": "as stated in the files",
     "neighbours": "estimated from neighbouring poses",
 }
 """Source of the noise, in words."""
@@ -58,11 +58,11 @@ def text(diagnosis: Diagnosis) -> str:
     ]
     lines += ["", *_table(diagnosis), *noise(diagnosis)]
     if diagnosis.steady:
-        lines += ["", f"there before, and unchanged: {', '.join(diagnosis.steady)}"]
+        lines += ["", f"present before, and unchanged: {', '.join(diagnosis.steady)}"]
     for finding in diagnosis.findings:
         lines += ["", f"{finding.candidate.name}: {finding.candidate.title}", f"  {why(diagnosis, finding)}"]
         if finding.aliases:
-            lines.append(f"  may as well be: {', '.join(finding.aliases)}")
+            lines.append(f"  these explain the data equally well: {', '.join(finding.aliases)}")
         if diagnosis.mistake and diagnosis.mistake.remedy and finding is diagnosis.findings[0]:
             lines.append(f"  {diagnosis.mistake.remedy}")
         lines += [f"  {said}" for said in (constants(finding), odd(finding), carried(diagnosis, finding)) if said]
@@ -75,7 +75,10 @@ def text(diagnosis: Diagnosis) -> str:
             *(f"  {p.text}, {p.rms_um:.1f} um rms" for p in diagnosis.patterns),
         ]
     if diagnosis.moved:
-        lines += ["", "constants of the machine file that the data put elsewhere (the gap before has them there):"]
+        lines += [
+            "",
+            "constants of the machine file with another value by the data (the gap before is with that value):",
+        ]
         lines += [f"  {constant(each)}" for each in diagnosis.moved]
         lines += [f"  {each}" for each in held(diagnosis)]
     if diagnosis.verdict == NOTHING:
@@ -83,8 +86,8 @@ def text(diagnosis: Diagnosis) -> str:
     lines += _next(diagnosis)
     aside = int(diagnosis.case.outlying.sum())
     if aside:
-        said = "1 row put aside as an outlier (--json lists it)"
-        lines += ["", said if aside == 1 else f"{aside} rows put aside as outliers (--json lists them)"]
+        said = "1 row excluded as an outlier (--json lists it)"
+        lines += ["", said if aside == 1 else f"{aside} rows excluded as outliers (--json lists them)"]
     return "\n".join(lines) + "\n"
 
 
@@ -104,13 +107,16 @@ def verdict(diagnosis: Diagnosis) -> str:
     if diagnosis.case.since:
         return CHANGED[diagnosis.verdict]
     if diagnosis.verdict == NOTHING and diagnosis.rest.lacking:
-        return f"more than noise is left (p = {diagnosis.p_left:.1g}), but no more than the little that machines have"
+        return (
+            f"the residual exceeds the noise (p = {diagnosis.p_left:.1g}), but only by the small errors that every "
+            "machine has"
+        )
     if diagnosis.mistake is None:
         return SAID[diagnosis.verdict]
     return (
         MISTAKEN
         if len(diagnosis.findings) == 1
-        else f"{MISTAKEN} in part; once it is undone, {SAID[diagnosis.verdict]}"
+        else f"{MISTAKEN} in part; when it is corrected, {SAID[diagnosis.verdict]}"
     )
 
 
@@ -120,7 +126,7 @@ def noise(diagnosis: Diagnosis) -> list[str]:
     return (
         []
         if p is None or p < LACKING
-        else [f"what is left counts as noise: noise alone would leave as much with p = {p:.2g}"]
+        else [f"the residual counts as noise: noise alone gives as much with probability p = {p:.2g}"]
     )
 
 
@@ -135,7 +141,7 @@ def silence(diagnosis: Diagnosis) -> list[str]:
     count = diagnosis.case.considered
     few = shows_hardly_anything(diagnosis.findable, diagnosis.data.sizes)
     return [
-        *(["these data can show hardly anything"] if few else []),
+        *(["these data can show hardly any effect"] if few else []),
         findable_in_words(diagnosis.findable, count, diagnosis.data.sizes),
     ]
 
@@ -164,7 +170,7 @@ def constants(finding: EffectFinding) -> str:
 def odd(finding: EffectFinding) -> str:
     """Remarks on implausible coefficients; empty if there are none."""
     return (
-        f"hardly plausible: {'; '.join(finding.judgement.remarks)}"
+        f"not plausible: {'; '.join(finding.judgement.remarks)}"
         if finding.judgement and finding.judgement.remarks
         else ""
     )
@@ -180,10 +186,10 @@ def carried(diagnosis: Diagnosis, finding: EffectFinding) -> str:
 
 def rest(diagnosis: Diagnosis) -> str:
     """The unnamed remainder, and why it does not affect the verdict if it does not."""
-    said = f"without a name: {diagnosis.unknown_um:.1f} um rms of {diagnosis.rest.kind}"
+    said = f"without a name: {diagnosis.unknown_um:.1f} um rms, {diagnosis.rest.kind}"
     if diagnosis.verdict == UNKNOWN:
         return said
-    why = "without repeats it may be the part's or the instrument's"
+    why = "without repeats it may come from the part or the instrument"
     return f"{said} ({why if diagnosis.floor.source == 'neighbours' else 'too little to decide'})"
 
 
@@ -194,10 +200,10 @@ def _next(diagnosis: Diagnosis) -> list[str]:
         return []
     if p.plan is None:
         alike = ", ".join((p.name, *p.alternatives))
-        return ["", f"{alike}: {p.reason}; no measurement of this kind would tell them apart"]
+        return ["", f"{alike}: {p.reason}; no measurement of this kind distinguishes them"]
     lines = [
         "",
-        f"to tell {p.name} from {', '.join(p.alternatives)} ({p.reason}):",
+        f"to distinguish {p.name} from {', '.join(p.alternatives)} ({p.reason}):",
         f"  {hope(p)}; --next FILE writes them",
     ]
     lines += [f"  {said}" for said in (unusual(p), hopeless(p)) if said]
@@ -207,12 +213,12 @@ def _next(diagnosis: Diagnosis) -> list[str]:
 def hope(proposal: Proposal) -> str:
     """The chance that the proposed poses leave one name."""
     assert proposal.plan is not None
-    said = f"{len(proposal.plan)} more poses leave one name in {_of_hundred(proposal.chance)}"
+    said = f"{len(proposal.plan)} more poses leave only one name in {_of_hundred(proposal.chance)}"
     if proposal.stuck:
-        return f"{said}: were it {' or '.join(proposal.stuck)}, another name would stay beside it"
+        return f"{said}; if the truth is {' or '.join(proposal.stuck)}, another name remains possible"
     if proposal.times == 1 or proposal.chance >= NEARLY:
         return said
-    return f"{said}, and in nearly all if each is measured {proposal.times} times"
+    return f"{said}, and in nearly all cases if each is measured {proposal.times} times"
 
 
 def _of_hundred(chance: float) -> str:
@@ -225,13 +231,13 @@ def unusual(proposal: Proposal) -> str:
     said = [f"{', '.join(far)} beyond the travels measured so far"] if far else []
     if proposal.tools:
         lengths = " and ".join(f"{each:g} mm" for each in proposal.tools)
-        said.append(f"a tool of {lengths}, or one that differs as much from those that were used")
-    return f"they need {'; and '.join(said)}" if said else ""
+        said.append(f"a tool of {lengths}, or of another length that differs as much from those used")
+    return f"the poses need {'; and '.join(said)}" if said else ""
 
 
 def hopeless(proposal: Proposal) -> str:
     """Rivals that no pose on offer tells apart."""
-    return f"{', '.join(proposal.alike)}: no measurement of this kind would tell that apart" if proposal.alike else ""
+    return f"{', '.join(proposal.alike)}: no measurement of this kind distinguishes that" if proposal.alike else ""
 
 
 def why(diagnosis: Diagnosis, finding: EffectFinding) -> str:

@@ -96,26 +96,27 @@ def _features(data: ResidualData) -> Iterator[tuple[str, Array]]:
             low, high = data.measured.spans[axis.name]
             u[axis.name] = (data.q[:, index] / axis.unit - (low + high) / 2) * 2 / (high - low)
             if axis.rotary:
-                yield f"swings with {axis.name} once a turn ({{}})", np.cos(data.q[:, index])
-                yield f"swings with {axis.name} once a turn, a quarter later ({{}})", np.sin(data.q[:, index])
-                yield f"swings with {axis.name} twice a turn ({{}})", np.cos(2 * data.q[:, index])
+                yield f"varies as cos {axis.name} ({{}})", np.cos(data.q[:, index])
+                yield f"varies as sin {axis.name} ({{}})", np.sin(data.q[:, index])
+                yield f"varies as cos 2{axis.name} ({{}})", np.cos(2 * data.q[:, index])
             else:
                 linear.append(axis.name)
                 yield f"grows with {axis.name} ({{}} from the middle to the end)", u[axis.name]
-            yield f"is bowed along {axis.name} ({{}})", u[axis.name] ** 2 - 1 / 3
-            yield f"is bent like an S along {axis.name} ({{}})", u[axis.name] ** 3 - 0.6 * u[axis.name]
+            yield f"is parabolic along {axis.name} ({{}})", u[axis.name] ** 2 - 1 / 3
+            yield f"is cubic along {axis.name} ({{}})", u[axis.name] ** 3 - 0.6 * u[axis.name]
     for letter in data.machine.axis_names:
         side = data.column(f"dir_{letter}")
         if np.ptp(side) > 0:
-            yield f"depends on the direction of {letter} ({{}} when it moves in plus)", side
+            yield f"depends on the direction of {letter} ({{}} when it moves towards plus)", side
             for other in linear:
                 yield (
-                    f"grows with {other} by the direction of {letter} ({{}} at the end of {other}, {letter} in plus)",
+                    f"grows with {other}, with opposite sign for the two directions of {letter} ({{}} at the end "
+                    f"of {other}, {letter} towards plus)",
                     side * u[other],
                 )
     for k, first in enumerate(linear):
         for other in linear[k + 1 :]:
-            yield f"grows with {first} where {other} is far out ({{}})", u[first] * u[other]
+            yield f"grows with the product of {first} and {other} ({{}} at the end of both)", u[first] * u[other]
     for name in ("time_s", "load_kg", "tool_length", *data.measured.sensors):
         values = data.column(name)
         if np.ptp(values) > 0:
@@ -123,7 +124,10 @@ def _features(data: ResidualData) -> Iterator[tuple[str, Array]]:
             yield f"changes with {name} ({{}} from the middle to the end)", scaled
             if name.startswith("temp_") or name == "time_s":
                 for other in linear:
-                    yield f"grows with {other} as {name} rises ({{}})", scaled * u[other]
+                    yield (
+                        f"grows with the product of {other} and {name} ({{}} at the end of both)",
+                        scaled * u[other],
+                    )
 
 
 def clustering(background: Background, residual: Array, places: Array) -> float:

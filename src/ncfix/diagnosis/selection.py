@@ -417,6 +417,6 @@ def findable_in_words(findable: Mapping[str, float], count: int, sizes: Sequence
     found = [(size, sum(own <= size for own in findable.values())) for size in sizes]
     steps = [(size, number) for k, (size, number) in enumerate(found) if number > (found[k - 1][1] if k else 0)]
     if not steps:
-        return f"none of {count} effects would have been found, were it {sizes[-1]:g} um rms"
+        return f"none of {count} effects would have been found, even with {sizes[-1]:g} um rms"
     first, *others = [f"from {size:g} um rms on {number}" for size, number in steps]
-    return f"what would have been found: {', '.join([f'{first} of {count} effects', *others])}"
+    return f"these data would have shown: {', '.join([f'{first} of {count} effects', *others])}"

@@ -293,7 +293,7 @@ SKEWED = 0.01
 LINEAR = "XYZ"
 TURNS_ABOUT = dict(zip("ABC", LINEAR, strict=True))
 """Rotation letter -> the direction that it turns about."""
-IDLE = "no effect unless carried"
+IDLE = "no effect without `carried`"
 """Remark on a location error that moves an axis line only along or about itself."""
 
 

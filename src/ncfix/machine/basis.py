@@ -297,9 +297,9 @@ def distinct(name: str, values: tuple[int, ...], lowest: int) -> list[tuple[str,
     if min(values) < lowest:
         return [(name, f"{min(values)} is below {lowest}")]
     if max(values) > HIGHEST:
-        return [(name, f"goes beyond {HIGHEST}")]
+        return [(name, f"exceeds {HIGHEST}")]
     if len(set(values)) < len(values):
-        return [(name, "names a value twice")]
+        return [(name, "has a value twice")]
     return []
 
 

@@ -73,7 +73,9 @@ def loads(source: str | bytes, path: str = "<machine>") -> Machine:
     text = source if isinstance(source, str) else decoded(source, path, "NCF301")
     values = parsed(text, path, "NCF301", "docs/formats.md shows a machine file")
     if "topology" not in values and SETUP & values.keys():
-        raise ConfigError.of("NCF303", "this is a setup file, not a machine file", Place(path), "--setup is for setups")
+        raise ConfigError.of(
+            "NCF303", "this is a setup file, not a machine file", Place(path), "give a setup file with --setup"
+        )
     report = Report(path, text, key_lines(text), top=set(TOP))
     machine = _machine(TomlTable(values, (), report))
     if machine is None or report.messages:
@@ -84,14 +86,14 @@ def loads(source: str | bytes, path: str = "<machine>") -> Machine:
 
 def _machine(root: TomlTable) -> Machine | None:
     if root.integer("ncfix") not in (None, SCHEMA):
-        text = f"schema version {root.values['ncfix']}, this ncfix reads {SCHEMA}"
+        text = f"version {root.values['ncfix']} of the machine file; this ncfix reads version {SCHEMA}"
         root.note("NCF317", "ncfix", text, "a newer ncfix may read it")
     name = root.text("name") or Path(root.report.path).stem
     order = None
     if (chain := root.text("topology", required=True)) is not None:
         order, wrong = parse_topology(chain)
         for fault in wrong:
-            root.note("NCF306", "topology", f"{chain!r}: {fault}", 'it reads like "w C B F X Y Z t"')
+            root.note("NCF306", "topology", f"{chain!r}: {fault}", 'write it like "w C B F X Y Z t"')
     axes, tool = _axes(root, order), GaugeLine()
     if (section := root.table("tool")) is not None:
         direction = _unit(section, required=False, default=(0.0, 0.0, 1.0))
@@ -121,7 +123,7 @@ def _machine(root: TomlTable) -> Machine | None:
         with np.errstate(all="ignore"):
             finite = [np.isfinite(at_the_ends(machine, effect)).all() for effect in each]
         if not all(finite):
-            hint = "see center, scale and degree: a power of u = (x - center) / scale grows beyond all numbers"
+            hint = "check center, scale and degree: a power of u = (x - center) / scale becomes too large"
             root.report.note("NCF305", ("effect", index), "the effect is not finite at the ends of the travel", hint)
     return machine
 
@@ -150,10 +152,10 @@ def _axis(section: TomlTable, letter: str, workpiece_side: bool) -> Axis:
     rotary = section.choice("type", "linear", "rotary", required=True) == "rotary"
     direction = _unit(section, required=True, default=(1.0, 0.0, 0.0))
     point = _vector(section, "point", ORIGIN)
-    low, high = section.range("range", "omit it for an endless axis") or (-np.inf, np.inf)
+    low, high = section.range("range", "leave it out for an endless axis") or (-np.inf, np.inf)
     limits = (low * DEGREE, high * DEGREE) if rotary else (low, high)
     triad = _triad(section)
-    moving = section.choice("error_frame", "fixed", "moving", hint="fixed is the default") == "moving"
+    moving = section.choice("error_frame", "fixed", "moving", hint="the default is fixed") == "moving"
     pitch = section.positive("pitch")
     section.close()
     return Axis(letter, rotary, workpiece_side, direction, point, limits, triad, moving, pitch)
@@ -185,7 +187,7 @@ def _triad(section: TomlTable) -> Triad:
     off = np.abs(matrix @ matrix.T - np.eye(3)).max()
     if off > TILTED or np.linalg.det(matrix) < 0:
         text = "the rows are not a right-handed triad of perpendicular unit vectors"
-        section.note("NCF313", "error_axes", text, "the third row is the first cross the second")
+        section.note("NCF313", "error_axes", text, "the third row is the cross product of the first and the second")
         return BASE_AXES
     if off > EXACT:
         left, _, right = np.linalg.svd(matrix)
@@ -232,7 +234,7 @@ def _effects(
     basis = _basis(section, kind) if kind is not None else None
     coefficients = section.numbers("coefficients", required=True)
     if basis is not None and coefficients is not None and len(coefficients) != basis.size:
-        text = f"{len(coefficients)} coefficients, the basis {basis.name} has {basis.size}"
+        text = f"{len(coefficients)} coefficients, but the basis {basis.name} needs {basis.size}"
         section.note("NCF311", "coefficients", text, f"one each for {', '.join(basis.labels[:12])}")
     options = _options(section, letters, len(coefficients or ()))
     if name is not None and basis is not None and ("input" in options or not section.has("input")):
@@ -326,14 +328,14 @@ def _signal(section: TomlTable, key: str, letters: tuple[str, ...]) -> str | Non
     if key == "input" and SUM in name and set(name.split(SUM)) <= set(letters):
         return name
     text = f"{name!r} is neither an axis of this machine nor the name of an input"
-    section.note("NCF314", key, text, "inputs are called like temp_spindle, time_s, load_kg")
+    section.note("NCF314", key, text, "inputs have names like temp_spindle, time_s, load_kg")
     return None
 
 
 def _scale(section: TomlTable, key: str) -> float | None:
     value = section.number(key)
     if value is not None and abs(value) < SMALLEST_SCALE:
-        section.note("NCF305", key, "the scale cannot be zero" if value == 0 else f"{value:g} is no scale")
+        section.note("NCF305", key, "the scale cannot be zero" if value == 0 else f"{value:g} is not a possible scale")
     return value
 
 
@@ -364,14 +366,18 @@ def _check_fit(section: TomlTable, effect: Effect, axes: Mapping[str, Axis]) -> 
         note("basis", f"{name} has no direction of motion", "give an axis as `input`")
     summed = (source or "").split(SUM) if SUM in (source or "") else []
     if summed and (basis.kinks or not all(axes[each].rotary for each in summed)):
-        note("input", f"{source} is no sum of angles that {basis.name} can depend on", "rotary axes, no table")
+        note(
+            "input",
+            f"{source} is not a sum of angles on which {basis.name} can depend",
+            "a sum needs rotary axes, and a basis without kinks, so not `table`",
+        )
     axis = axes.get(summed[0] if summed else source or effect.joint)
     if basis.rotary_only and (axis is None or not axis.rotary) and (axis is not None or source is not None):
         note("basis", f"{basis.name} needs the angle of a rotary axis", "use `periodic` with a `period`")
     if effect.carried and not effect.location:
         note("carried", f"{name} is not a location error", "`carried` is for names like EC0Y")
     if effect.time_constant_s is not None and source is None:
-        note("time_constant_s", "a lag acts on an `input`, and there is none")
+        note("time_constant_s", "a time constant needs an `input`, but none is given")
 
 
 def _of_physical(section: TomlTable, named: PhysicalEffect) -> tuple[Effect, ...]:
@@ -384,14 +390,16 @@ def _of_physical(section: TomlTable, named: PhysicalEffect) -> tuple[Effect, ...
     size = sum(effect.basis.size for effect in named.effects)
     if values is not None and len(values) != size:
         parts = ", ".join(f"{e.name} {label}" for e in named.effects for label in e.basis.labels)
-        text = f"{len(values)} coefficients, {named.name} has {size}"
+        text = f"{len(values)} coefficients, but {named.name} has {size}"
         section.note("NCF311", "coefficients", text, f"one each for {parts}")
     lagging = {effect.time_constant_s for effect in named.effects}
     if constant is not None and lagging == {None}:
-        section.note("NCF315", "time_constant_s", f"{named.name} follows nothing after a time")
+        section.note("NCF315", "time_constant_s", f"{named.name} does not follow an input, so it has no time constant")
     elif constant is not None and len(lagging) > 1:
         text = f"{named.name} has several time constants"
-        section.note("NCF315", "time_constant_s", text, "write its components one by one: `ncfix effects` shows them")
+        section.note(
+            "NCF315", "time_constant_s", text, "write its components as single effects: `ncfix effects` lists them"
+        )
     elif constant is not None and constant <= 0:
         section.note("NCF305", "time_constant_s", f"{constant:g} is not positive")
     section.close()

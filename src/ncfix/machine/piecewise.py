@@ -164,11 +164,11 @@ class Spline(Basis):
 
     def complaints(self) -> list[tuple[str, str]]:
         if self.degree < 1:
-            return [("degree", "a spline has degree 1 or more; `step` is piecewise constant")]
+            return [("degree", "a spline needs degree 1 or more; the basis `step` is piecewise constant")]
         if len(self.knots) < 2 * self.degree + 2:
             return [("knots", f"degree {self.degree} needs at least {2 * self.degree + 2} knots, ends repeated")]
         if self.domain[0] >= self.domain[1]:
-            return [("knots", "the knots leave no range")]
+            return [("knots", "the knots enclose no range")]
         return ascending("knots", self.knots, strictly=False)
 
     def rows(self, u: Array, direction: Array) -> Array:
@@ -277,13 +277,13 @@ class Truncated(Basis):
         wrong = ascending("knots", self.knots)
         wrong += distinct("powers", self.powers, lowest=0) if self.powers else []
         if not self.powers and not self.knots:
-            wrong.append(("knots", "there are neither knots nor powers"))
+            wrong.append(("knots", "neither knots nor powers are given"))
         if self.degree < 1:
-            wrong.append(("degree", "pieces have degree 1 or more; `step` is piecewise constant"))
+            wrong.append(("degree", "pieces need degree 1 or more; the basis `step` is piecewise constant"))
         if len(self.detrended) not in (0, 2) or (self.detrended and self.detrended[0] >= self.detrended[1]):
             wrong.append(("detrended", "two ends, the lower one first"))
         elif self.detrended and not all(self.detrended[0] <= knot < self.detrended[1] for knot in self.knots):
-            wrong.append(("knots", "they lie between the ends of `detrended`"))
+            wrong.append(("knots", "knots must be between the ends of `detrended`"))
         return wrong
 
     def rows(self, u: Array, direction: Array) -> Array:

@@ -112,7 +112,7 @@ def required(machine: Machine, path: str, accepted: str) -> list[Message]:
     found = doubts(machine, path)
     if any(each.impossible for each in found):
         impossible = [each.message for each in doubts(machine, path, lines=True) if each.impossible]
-        text = f"no machine is like this one: nothing is made with it; {accepted}"
+        text = f"this machine is impossible and is not used; {accepted}"
         raise RefusedError((*impossible, Message("NCF324", text, Place(path))))
     return [each.message for each in found]
 
@@ -192,8 +192,8 @@ def _sizes(machine: Machine) -> Iterator[Fault]:
         hint, impossible, extent = "", size > BEYOND * limit, "more than"
         if impossible:
             meant = [f"{size:.4g} {unit}" for unit, factor in UNITS[angle] if LEAST * limit <= size * factor <= limit]
-            hint = f"is {' or '.join(meant)} meant? Coefficients are in {'rad' if angle else 'mm'}"
-            hint = hint if meant else "see the unit, and `center`, `scale` and `range`"
+            hint = f"coefficients are in {'rad' if angle else 'mm'}; is {' or '.join(meant)} meant?"
+            hint = hint if meant else "check the unit, `center`, `scale` and `range`"
             extent = f"{size / limit:.3g} times"
         title, most = component_title(name, machine.axis(name[-1])), sized(limit, angle)
         text = f"{name}, {title}: {sized(size, angle)} is {extent} {most}, which few machines exceed"
@@ -218,7 +218,7 @@ def sized(value: float, angle: bool) -> str:
 # -- axes --------------------------------------------------------------------------------------------------------------
 
 
-LEFT_HAND = "of an axis below the workpiece `direction` says how its body moves: X' goes [-1, 0, 0]"
+LEFT_HAND = "for an axis that moves the workpiece, `direction` is the motion of its body: X' has [-1, 0, 0]"
 
 
 def _span(machine: Machine) -> Iterator[Fault]:
@@ -231,12 +231,15 @@ def _span(machine: Machine) -> Iterator[Fault]:
         )
         dependent = next(parallel, linear)
         names = " and ".join(axis.name for axis in dependent)
-        text = f"{names} do not span {'a plane' if len(dependent) == 2 else 'space'}: one moves as others do"
-        yield "NCF321", text, "see their `direction`", True, "axis", dependent[-1].name, "direction"
+        text = (
+            f"{names} do not span {'a plane' if len(dependent) == 2 else 'space'}: one axis only repeats the motion "
+            "of the others"
+        )
+        yield "NCF321", text, "check `direction` of these axes", True, "axis", dependent[-1].name, "direction"
     elif len(linear) == 3:
         toward = {axis.name: np.array(axis.direction) * (-1 if axis.workpiece_side else 1) for axis in linear}
         if np.linalg.det([toward[name] for name in "XYZ"]) < 0:
-            text = "X, Y and Z are left-handed, as seen from the workpiece: one of them has the wrong sign"
+            text = "X, Y and Z are left-handed, seen from the workpiece: one of them has the wrong sign"
             below = next((axis.name for axis in linear if axis.workpiece_side), linear[0].name)
             yield "NCF325", text, LEFT_HAND, False, "axis", below, "direction"
     for first, second in pairwise(machine.axes):
@@ -245,31 +248,36 @@ def _span(machine: Machine) -> Iterator[Fault]:
         apart = np.cross(np.asarray(second.point) - np.asarray(first.point), first.direction)
         if np.linalg.norm(np.cross(first.direction, second.direction)) < SAME and np.linalg.norm(apart) < SAME_MM:
             text = f"{first.name} and {second.name} turn about the same line, with no axis between them"
-            yield "NCF321", text, "see `direction` and `point` of both", True, "axis", second.name, "direction"
+            yield "NCF321", text, "check `direction` and `point` of both axes", True, "axis", second.name, "direction"
 
 
 def _travels(machine: Machine) -> Iterator[Fault]:
     travels = [axis.range[1] - axis.range[0] for axis in machine.axes if axis.name in "XYZ" and not axis.rotary]
     if len(travels) == 3 and min(travels) >= LEAST_TRAVEL and max(travels) < SMALL_TRAVEL:
-        text = f"no axis has a travel above {max(travels):g} mm"
-        yield "NCF322", text, f"is it in inches, {INCH * max(travels):g} mm? `range` is in mm", False
+        text = f"the travels of all linear axes are at most {max(travels):g} mm"
+        yield (
+            "NCF322",
+            text,
+            f"`range` is in mm; is it given in inches? That would be {INCH * max(travels):g} mm",
+            False,
+        )
     for axis in machine.axes:
         low, high = (limit / axis.unit for limit in axis.range)
         range_of = ("axis", axis.name, "range")
         if axis.rotary:
             if np.isfinite(high - low) and _radians((low, high)):
-                text = f"{axis.name}: the range {low:g} ... {high:g} looks like radians: degrees are asked for"
+                text = f"{axis.name}: the range {low:g} ... {high:g} looks like radians; `range` is in degrees"
                 hint = f"is {np.degrees(low):.4g} ... {np.degrees(high):.4g} degrees meant?"
                 yield "NCF322", text, hint, True, *range_of
         elif np.isfinite(high - low) and not LEAST_TRAVEL <= high - low <= MOST_TRAVEL:
             meant = "metres" if high - low < LEAST_TRAVEL else "um"
             text = f"{axis.name}: no axis has a travel of {high - low:g} mm"
-            yield "NCF322", text, f"is it in {meant}? `range` is in mm", True, *range_of
+            yield "NCF322", text, f"`range` is in mm; is it given in {meant}?", True, *range_of
         if axis.pitch is not None and not PITCHES[0] <= axis.pitch <= PITCHES[1]:
-            text = f"{axis.name}: no screw and no rack has a pitch of {axis.pitch:g} mm"
-            yield "NCF322", text, "`pitch` is in mm a turn", True, "axis", axis.name, "pitch"
+            text = f"{axis.name}: no screw or rack has a pitch of {axis.pitch:g} mm"
+            yield "NCF322", text, "`pitch` is in mm per turn", True, "axis", axis.name, "pitch"
         if np.abs(axis.point).max() > MOST_TRAVEL:
-            text = f"{axis.name}: its point is {np.abs(axis.point).max():g} mm away"
+            text = f"{axis.name}: its point is {np.abs(axis.point).max():g} mm from the origin"
             yield "NCF322", text, "`point` is in mm", True, "axis", axis.name, "point"
 
 
@@ -298,11 +306,11 @@ def _settings(machine: Machine) -> Iterator[Fault]:
     ):
         for value, limit, unit in zip((values[0], np.degrees(values[1])), limits, ("mm", "degree"), strict=True):
             if value > limit:
-                text = f"{key}: {value:.4g} {unit} is more than any machine has"
-                yield "NCF322", text, "it is in mm and degrees: 0.001 is a micrometre", True, key
+                text = f"{key}: {value:.4g} {unit} is larger than on any machine"
+                yield "NCF322", text, "the values are in mm and degrees: 0.001 is one micrometre", True, key
     for name, place in ("workpiece_offset", machine.workpiece_offset), ("tool.point", machine.tool.point):
         if np.abs(place).max() > MOST_TRAVEL:
-            text = f"{name}: {np.abs(place).max():g} mm is further than any machine reaches"
+            text = f"{name}: {np.abs(place).max():g} mm is beyond the reach of any machine"
             yield "NCF322", text, "it is in mm", True, *name.split(".")
 
 
@@ -327,9 +335,9 @@ def _positions(machine: Machine) -> Iterator[Fault]:
         if (places[-1] <= low and not axis.endless) or (places[0] >= high and not axis.endless):
             yield "NCF323", f"{shown} are outside the range of {axis.name}, {low:g} ... {high:g}", "", True, *keys
         elif axis.rotary and high - low > 45 and np.abs(places).max() <= TURN_RAD and _radians((places[0], places[-1])):
-            yield "NCF323", f"{shown} look like radians: {axis.name} is in degrees", "", True, *keys
+            yield "NCF323", f"{shown} look like radians; positions of {axis.name} are in degrees", "", True, *keys
         elif not axis.rotary and (whose := _inches(places, low, high)):
             yield "NCF323", f"{shown} beside the range of {axis.name}, {low:g} ... {high:g}", whose, True, *keys
         elif np.ptp(places) < CORNER * (high - low):
-            text = f"{shown} cover a speck of the range of {axis.name}, {low:g} ... {high:g}"
+            text = f"{shown} cover almost nothing of the range of {axis.name}, {low:g} ... {high:g}"
             yield "NCF323", text, f"positions are in {'degrees' if axis.rotary else 'mm'}", True, *keys

@@ -102,7 +102,7 @@ def flatten(q: ArrayLike, state: State, axes: tuple[Axis, ...], names: frozenset
         raise UsageError.collected(
             Message(
                 "NCF340",
-                f"the machine's errors depend on {name!r}, which is not given",
+                f"an error of the machine depends on {name!r}, whose value is not given",
                 hint=f"--input {name}=VALUE or [inputs] in the setup file; with measurements, a column of that name",
             )
             for name in missing

@@ -37,8 +37,8 @@ PLACES = 400
 UM = 1e3
 FURTHER, LONGER = 200, 100.0
 """Number of further poses, and mm by which the longest tool is exceeded, to find what more measurements would show."""
-SEPARATE = "`ncfix plan --separate` finds poses that tell them apart"
-APART = "more poses of this kind do not tell them apart: another instrument may, or a set-up that is known"
+SEPARATE = "`ncfix plan --separate` finds poses that distinguish them"
+APART = "no further poses of this kind distinguish them; another instrument may, or a set-up whose position is known"
 
 
 def calibrate(
@@ -155,8 +155,8 @@ def _outliers(estimate: Estimate, residuals: Residuals) -> Iterator[Message]:
     for index in aside[np.argsort(-np.abs(residuals.studentised[aside]))][:NAMED].tolist():
         factor, unit = (1e6, "urad") if residuals.turns[index] else (1e3, "um")
         size = f"{residuals.value[index] * factor:+.1f} {unit}"
-        text = f"{residuals.component[index]} is {size} from the model: an outlier, given no weight"
-        yield Message("NCF633", text, residuals.place(index), "look at that row; --loss none keeps it")
+        text = f"{residuals.component[index]} differs by {size} from the model: an outlier, which gets no weight"
+        yield Message("NCF633", text, residuals.place(index), "check this row; --loss none gives it full weight")
     if len(aside) > NAMED:
         yield Message("NCF633", f"{len(aside) - NAMED} more outliers")
 
@@ -165,14 +165,20 @@ def _left_out(names: Sequence[str], level: float | None) -> Iterator[Message]:
     if names:
         more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
         listed = ", ".join(names[:NAMED]) + more
-        yield Message("NCF644", f"left out, not significant at {level:g}: {listed}; sigmas count in what they may be")
+        yield Message(
+            "NCF644",
+            f"not significant at {level:g}, so set to zero: {listed}; the standard deviations "
+            "allow for their possible size",
+        )
 
 
 def _noise(problem: Problem, scale: float) -> Iterator[Message]:
     if problem.noise_known and scale > 1:
         times = f"{scale:.2f}" if scale < 100 else f"{scale:.0f}"
-        text = f"the residuals are {times} times the noise: an effect is missing, or the noise is larger"
-        yield Message("NCF634", text, hint="`ncfix diagnose` looks for what is missing")
+        text = (
+            f"the residuals are {times} times the noise: the model lacks an effect, or the noise is larger than stated"
+        )
+        yield Message("NCF634", text, hint="`ncfix diagnose` looks for the missing effect")
 
 
 def _told_by_more(problem: Problem, solution: Solution) -> frozenset[int]:
@@ -202,25 +208,32 @@ def untold(solution: Solution, labels: Sequence[str], told_by_more: Collection[i
 
     told_by_more  coefficients that more poses would determine, for the hint
     """
-    found = _unseen(_listed(solution.unseen, labels), "nothing that was measured depends on")
-    found += _unseen(_listed(solution.set_up, labels), "the unknown set-up takes the place of")
+    found = _unseen(_listed(solution.unseen, labels), "no measured value depends on")
+    found += _unseen(_listed(solution.set_up, labels), "the unknown set-up has the same effect as")
     for each in solution.combinations:
         helps = {each.held, *each.others} <= set(told_by_more)
         found.append(_combined(each, labels, SEPARATE if helps else APART))
     if weak := _listed(solution.weak, labels):
-        are = "is held as it is" if len(weak) == 1 else "are held as they are"
-        text = f"{', '.join(weak)} {are}: these measurements would tell it to no better than what is much"
-        found.append(Message("NCF620", text, hint="measure where it acts: `ncfix plan`"))
+        are = "keeps the value of the machine file" if len(weak) == 1 else "keep the value of the machine file"
+        text = (
+            f"{', '.join(weak)} {are}: these measurements would determine it only to more than a large error of this "
+            "kind"
+        )
+        found.append(Message("NCF620", text, hint="measure at poses where it acts; `ncfix plan` finds them"))
     if solution.condition > 1e4:
-        text = f"the estimates depend strongly on one another: condition {solution.condition:.0f}"
-        found.append(Message("NCF638", text, hint="measure at more varied poses, or estimate fewer effects"))
+        text = f"the estimates depend strongly on one another: condition number {solution.condition:.0f}"
+        found.append(Message("NCF638", text, hint="measure at more different poses, or estimate fewer effects"))
     return found
 
 
 def _unseen(names: Sequence[str], why: str) -> list[Message]:
     if not names:
         return []
-    are, them = ("is held as it is", "it") if len(names) == 1 else ("are held as they are", "them")
+    are, them = (
+        ("keeps the value of the machine file", "it")
+        if len(names) == 1
+        else ("keep the value of the machine file", "them")
+    )
     return [Message("NCF632", f"{', '.join(names)} {are}: {why} {them}")]
 
 
@@ -235,10 +248,18 @@ def _combined(combination: Combination, labels: Sequence[str], hint: str) -> Mes
     held = labels[combination.held]
     names = [labels[k] for k in combination.others]
     if len(names) > 4:
-        text = f"{held} and {', '.join(names[:4])} and {len(names) - 4} more: only combinations; {held} is held"
+        text = (
+            f"of {held} and {', '.join(names[:4])} and {len(names) - 4} more, these measurements determine only "
+            f"combinations; {held} keeps the value of the machine file"
+        )
         return Message("NCF631", text, hint=hint)
     listed = f"{', '.join([held, *names[:-1]])} and {names[-1]}"
-    return Message("NCF631", f"{listed}: only {_what(combination, held, names)}; {held} is held as it is", hint=hint)
+    return Message(
+        "NCF631",
+        f"of {listed}, these measurements determine only {_what(combination, held, names)}; "
+        f"{held} keeps the value of the machine file",
+        hint=hint,
+    )
 
 
 def _what(combination: Combination, held: str, names: Sequence[str]) -> str:
@@ -287,8 +308,9 @@ def guesses(calibration: Calibration, over: Prediction) -> tuple[Message, ...]:
         return ()
     at = ", ".join(f"{name} {value:g}" for name, value in over.at.items() if name != "tool_length")
     text = (
-        f"at {at} the tip error is known to {over.worst_um:.1f} um (1 sigma), and only {calibration.before_um:.1f} um "
-        "rms were there before: away from the measured poses the model is a guess"
+        f"at {at} the standard deviation of the predicted tip error is {over.worst_um:.1f} um, but the residuals "
+        f"before the calibration were only {calibration.before_um:.1f} um rms: away from the measured poses the "
+        "model is a guess"
     )
     hint = "measure where `ncfix plan --existing` says, or estimate fewer effects: --effects"
     return (Message("NCF641", text, hint=hint),)

@@ -94,15 +94,18 @@ class Room:
                 yield f"the machine has no axis {name}, only {' '.join(travels)}", "--range AXIS=LOW,HIGH"
             elif low < travels[name][0] - ROUNDING or high > travels[name][1] + ROUNDING:
                 lowest, highest = travels[name]
-                yield f"{name} goes from {lowest:g} to {highest:g} only", f"--range {name}={lowest:g},{highest:g}"
+                yield (
+                    f"the travel of {name} is only {lowest:g} to {highest:g}",
+                    f"--range {name}={lowest:g},{highest:g}",
+                )
         for name in self.reach:
             if name not in ("x", "y", "z"):
                 yield f"{name} is none of x, y and z of the workpiece", "--reach x=LOW,HIGH"
         for name, at in self.balls.items():
             if not np.isfinite(at).all():
-                yield f"the ball {name} stands nowhere", f"--ball {name}=X,Y,Z"
+                yield f"the position of the ball {name} is not finite", f"--ball {name}=X,Y,Z"
         if not len(self.tool_lengths):
-            yield "there is no tool to measure with", "--tool-length MM"
+            yield "no tool length is given", "--tool-length MM"
 
     def _miscounted(self) -> Iterator[tuple[str, str]]:
         """Faults of ranges that are not two numbers, and of balls without three coordinates."""
@@ -112,7 +115,7 @@ class Room:
                     yield f"the range of {name} is not two numbers", f"{option} {name}=LOW,HIGH"
         for name, at in self.balls.items():
             if len(at) != 3:
-                yield f"the place of the ball {name} is not three numbers", f"--ball {name}=X,Y,Z"
+                yield f"the position of the ball {name} is not three numbers", f"--ball {name}=X,Y,Z"
 
 
 def offered(machine: Machine, kind: str, count: int, room: Room, seed: int = 0) -> Measurement:
@@ -148,8 +151,8 @@ def _within_reach(machine: Machine, kind: str, count: int, room: Room, random: n
             return {name: np.concatenate([part[name] for part in parts])[:count] for name in found}
         found = _drawn(machine, count, room, random)
     limits = ", ".join(f"{low:g} < {name} < {high:g}" for name, (low, high) in room.reach.items())
-    text = f"{kept} of {TRIES * count} poses tried have their tip within {limits}"
-    raise UsageError.of("NCF636", text, hint="wider --reach, or --range of axes that lead there")
+    text = f"only {kept} of {TRIES * count} poses that were tried have their tip within {limits}"
+    raise UsageError.of("NCF636", text, hint="give a wider --reach, or a --range of the axes that leads there")
 
 
 def _poses(machine: Machine, columns: Mapping[str, Array]) -> Array:
@@ -208,8 +211,8 @@ def r_test(machine: Machine, count: int, room: Room, seed: int = 0) -> Measureme
     balls = room.balls or _reachable_balls(machine, room, random, max(1, min(BALLS, count // (CHOICE * FEW))))
     beyond = [name for name, place in balls.items() if not _inside(np.array([place]), room).all()]
     if beyond:
-        text = f"the ball {beyond[0]} stands where the tip may not go"
-        raise UsageError.of("NCF636", text, hint="wider --reach, or another place")
+        text = f"the ball {beyond[0]} is outside the --reach of the tip"
+        raise UsageError.of("NCF636", text, hint="give a wider --reach, or another position of the ball")
     keys, places = list(balls), np.array(list(balls.values()))
     parts: list[dict[str, Array]] = []
     sets: list[str] = []

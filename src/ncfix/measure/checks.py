@@ -68,7 +68,7 @@ def _directions(measurement: Measurement) -> Iterator[Message]:
     for name, values in measurement.columns.items():
         if name.startswith("dir_") or name == "direction":
             for row in np.flatnonzero(~np.isin(values, (-1, 0, 1))):
-                text = f"{name} is {values[row]:g}, it can be -1, 0 or 1"
+                text = f"{name} is {values[row]:g}, but must be -1, 0 or 1"
                 yield Message("NCF612", text, measurement.place(int(row)))
 
 
@@ -82,7 +82,7 @@ def _clock(measurement: Measurement) -> Iterator[Message]:
         for at in np.flatnonzero(np.diff(time_s[rows]) < 0)[:1]:
             row = int(rows[at + 1])
             text = f"time goes backwards: {time_s[row]:g} s after {time_s[rows[at]]:g} s"
-            yield Message("NCF611", text, measurement.place(row), "a set of its own for what came after")
+            yield Message("NCF611", text, measurement.place(row), "give the rows after this one another `set`")
 
 
 def _named(measurement: Measurement, machine: Machine) -> Iterator[Message]:
@@ -95,7 +95,7 @@ def _named(measurement: Measurement, machine: Machine) -> Iterator[Message]:
             has = " ".join(machine.axis_names)
             yield Message("NCF610", f"the machine has no axis {axis}, only {has}", measurement.place(row))
         elif component_of(axis, component) is None:
-            text = f"{component!r} is no error motion of {axis}"
+            text = f"{component!r} is not an error motion of {axis}"
             names = [f"E{each}{axis}" for each in COMPONENTS]
             own = next(filter(machine.is_positioning, names), names[0])
             yield Message("NCF612", text, measurement.place(row), f"for example {own}")
@@ -107,7 +107,7 @@ def _lengths(measurement: Measurement) -> Iterator[Message]:
         return
     for name in ("length", "nominal", "radius"):
         for row in np.flatnonzero(measurement.columns.get(name, np.ones(0)) <= 0):
-            text = f"{name} is {measurement.columns[name][row]:g} mm, a distance is above zero"
+            text = f"{name} is {measurement.columns[name][row]:g} mm, but a distance must be above zero"
             yield Message("NCF612", text, measurement.place(int(row)))
     if set(ENDS) <= measurement.columns.keys():
         way = measurement.stacked(*ENDS[3:]) - measurement.stacked(*ENDS[:3])
@@ -121,7 +121,7 @@ def _marks(measurement: Measurement) -> Iterator[Message]:
         size = np.abs(values[rows])
         for row in rows[(size >= MARK_MM) & (size > MARK_RATIO * np.median(size))]:
             if not f"{abs(values[row]):.12g}".replace(".", "").strip("9"):
-                text = f"{name} is {values[row]:.12g}: a mark of what was not read?"
+                text = f"{name} is {values[row]:.12g}: is this the mark of a missing reading?"
                 yield Message("NCF612", text, measurement.place(int(row)), "leave out this row")
 
 
@@ -140,7 +140,7 @@ def _twice(measurement: Measurement) -> Iterator[Message]:
         if before != row:
             (copied if _alike(measurement, before, row) else again).append((before, row))
     yield from _repeated(measurement, again, "taken as a repeat")
-    yield from _repeated(measurement, copied, "with the same values: was it copied?")
+    yield from _repeated(measurement, copied, "with the same values; was the row copied?")
 
 
 def _alike(measurement: Measurement, first: int, second: int) -> bool:
@@ -152,8 +152,8 @@ def _alike(measurement: Measurement, first: int, second: int) -> bool:
 def _repeated(measurement: Measurement, pairs: Sequence[tuple[int, int]], what: str) -> Iterator[Message]:
     if pairs:
         before, row = pairs[0]
-        more = f" ({len(pairs) - 1} more rows likewise)" if len(pairs) > 1 else ""
-        text = f"the pose of line {measurement.place(before).line} once more, {what}{more}"
+        more = f" (and {len(pairs) - 1} more such rows)" if len(pairs) > 1 else ""
+        text = f"the same pose as in line {measurement.place(before).line}, {what}{more}"
         yield Message("NCF613", text, measurement.place(row))
 
 
@@ -163,7 +163,7 @@ def _radians(measurement: Measurement, machine: Machine) -> Iterator[Message]:
         low, high = (limit / axis.unit for limit in axis.range)
         if axis.rotary and high - low > 45 and _looks_like_radians(values, low, high):
             spread = f"{values.min():g} ... {values.max():g}"
-            text = f"the positions of {axis.name}, {spread}, look like radians: degrees are asked for"
+            text = f"the positions of {axis.name}, {spread}, look like radians; they must be in degrees"
             yield Message("NCF614", text, measurement.place(int(rows[np.abs(values).argmax()])))
 
 
@@ -204,7 +204,7 @@ def _lengths_in_another_unit(measurement: Measurement, machine: Machine) -> Iter
             if last - first > UNIT_SHARE * (high - low) and first > low - slack and last < high + slack:
                 text = f"the positions of {axis.name}, {first / size:g} ... {last / size:g}, look like {unit}: "
                 row = int(rows[np.abs(values).argmax()])
-                yield Message("NCF614", f"{text}mm are asked for", measurement.place(row))
+                yield Message("NCF614", f"{text}they must be in mm", measurement.place(row))
 
 
 def _ranges(measurement: Measurement, machine: Machine) -> Iterator[Message]:
@@ -216,7 +216,9 @@ def _ranges(measurement: Measurement, machine: Machine) -> Iterator[Message]:
             low, high = (limit / axis.unit for limit in axis.range)
             found = values[outside[0]] / axis.unit
             small = outside.size > len(values) / 2 and low <= (values / 1000).min() and (values / 1000).max() <= high
-            text = f"{axis.name} = {found:g} is outside its range {low:g} ... {high:g}, {outside.size} rows are"
+            text = (
+                f"{axis.name} = {found:g} is outside its range {low:g} ... {high:g}; so are {outside.size} rows in all"
+            )
             hint = "are they in um?" if small and not axis.rotary else "are columns swapped?"
             yield Message("NCF615", text, measurement.place(int(rows[outside[0]])), hint)
 
@@ -231,11 +233,11 @@ def _micrometres(measurement: Measurement, machine: Machine) -> Iterator[Message
         size, most = float(np.median(np.abs(values[rows]))), float(np.abs(values[rows]).max())
         place = measurement.place(int(rows[0]))
         if size > limit:
-            text = f"{name} is {size:g} {unit} in the median: errors are given in {unit}"
+            text = f"the median of {name} is {size:g} {unit}; errors must be in {unit}"
             hint = "are they in degrees, in seconds of arc, or in mrad?" if turns else "divide by 1000?"
             yield Message("NCF616", text, place, hint)
         elif measurement.kind == "axis" and not turns and 0 < most < SMALL_MM:
-            text = f"{name} is {1e3 * most:.2g} um at most: no laser tells so little"
+            text = f"{name} is {1e3 * most:.2g} um at most, which is less than a laser can measure"
             yield Message("NCF616", text, place, "are the values in metres or inches, or those of a .rtl in mm?")
 
 
@@ -250,8 +252,10 @@ def _circles(measurement: Measurement, machine: Machine) -> Iterator[Message]:
         rows = np.flatnonzero(sets == index)
         found, stated = (float(np.median(each[rows])) for each in (distance, measurement.columns["radius"]))
         if abs(found - stated) > ELSEWHERE:
-            text = f"the poses of set {name} are {found:.1f} mm from its centre, but the bar is {stated:g} mm long"
-            hint = "is tool_length given, and the centre (cx, cy, cz) in the workpiece frame?"
+            text = (
+                f"the poses of set {name} are {found:.1f} mm from the stated centre, but the bar is {stated:g} mm long"
+            )
+            hint = "give `tool_length`, and the centre (cx, cy, cz) in the workpiece frame"
             yield Message("NCF625", text, measurement.place(int(rows[0])), hint)
 
 

@@ -65,14 +65,14 @@ def misfit(calibration: Calibration) -> Message | None:
         return None
     times = f", {factor:.0f} times the noise" if factor > 1 else ""
     rms = f" ({calibration.after_um:.4g} um rms of {calibration.before_um:.4g} um before)"
-    text = f"the calibrated model does not describe these measurements: what it leaves{rms} is "
-    text += f"{factor:.0f} times the noise" if beyond else f"beyond max_correction, {most_um:g} um{times}"
+    text = f"the calibrated model does not describe these measurements: the residual{rms} is "
+    text += f"{factor:.0f} times the noise" if beyond else f"larger than max_correction, {most_um:g} um{times}"
     problem, estimate = calibration.problem, calibration.estimate
     rest = Residuals.of(problem, estimate)
     worst = int(np.argmax(np.abs(estimate.residual / problem.sigma) * (estimate.weight > 0)))
-    hint = "look at that row, at units (mm, rad, degree), signs and columns, and whether it is this machine; "
-    hint += "noise_um is in um"
-    return Message("NCF642", f"{text}; most in {rest.component[worst]}", rest.place(worst), hint)
+    hint = "check this row, the units (mm, rad, degree), signs and columns, and whether it is this machine; "
+    hint += "noise_um must be in um"
+    return Message("NCF642", f"{text}; it is largest in {rest.component[worst]}", rest.place(worst), hint)
 
 
 def conflicts(problem: Problem, estimate: Estimate) -> Iterator[Message]:
@@ -87,7 +87,7 @@ def untouched(measurement: Measurement) -> Message | None:
     if len(measurement) < FEWEST or len(same) < len(measurement.measured) or not same:
         return None
     value = measurement.columns[same[0]][0]
-    text = f"{', '.join(same)} {'is' if len(same) == 1 else 'are'} {value:g} in all rows: no instrument reads that"
+    text = f"{', '.join(same)} {'is' if len(same) == 1 else 'are'} {value:g} in all rows, which no instrument reads"
     return Message("NCF623", text, measurement.place(0), "was the file filled in?")
 
 
@@ -120,10 +120,10 @@ def _standards(problem: Problem, estimate: Estimate) -> Iterator[Message]:
         return
     missed = 1e3 * pull[at] / told[at] * problem.sigma[stated[at]]
     text = (
-        f"the stated distances cannot all be true: one is {missed:+.1f} um from what the others and the readings say, "
-        f"{far[at]:.0f} standard deviations of that"
+        f"the stated distances contradict each other: one differs by {missed:+.1f} um from the value that the others "
+        f"and the readings give, which is {far[at]:.0f} standard deviations"
     )
-    hint = "which standard is right? Leave the other out, or estimate what the model lacks: --effects"
+    hint = "leave out the wrong standard, or estimate the errors that the model lacks: --effects"
     yield Message("NCF621", text, Residuals.of(problem, estimate).place(int(stated[at])), hint)
 
 
@@ -145,9 +145,9 @@ def _outlying(problem: Problem, estimate: Estimate) -> Iterator[Message]:
         return
     residuals = Residuals.of(problem, estimate)
     if aside.sum() > max(FEW, MANY * len(aside)):
-        text = f"{int(aside.sum())} of {len(aside)} values are far from the model that the others make"
+        text = f"{int(aside.sum())} of {len(aside)} values are far from the model that fits the others"
         first = int(np.flatnonzero(aside)[0])
-        yield Message("NCF622", text, residuals.place(first), "which of them are right?")
+        yield Message("NCF622", text, residuals.place(first), "check which of them are right")
         return
     for file, each in enumerate(problem.observations):
         sets = np.array(each.measurement.sets)
@@ -156,5 +156,10 @@ def _outlying(problem: Problem, estimate: Estimate) -> Iterator[Message]:
             rows = np.flatnonzero(sets == name)
             count = len(np.intersect1d(rows, bad))
             if len(rows) >= FEWEST and count > ALL * len(rows):
-                text = f"{count} of {len(rows)} rows of set {name} are far from the model that the others make"
-                yield Message("NCF622", text, each.measurement.place(int(rows[0])), "is that set right, or the others?")
+                text = f"{count} of {len(rows)} rows of set {name} are far from the model that fits the other rows"
+                yield Message(
+                    "NCF622",
+                    text,
+                    each.measurement.place(int(rows[0])),
+                    "check whether this set is right, or the others",
+                )

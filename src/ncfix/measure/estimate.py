@@ -289,7 +289,7 @@ def _enough(problem: Problem) -> None:
     nuisance = problem.nuisance(problem.start)
     k = int(np.linalg.matrix_rank(nuisance)) if nuisance.shape[1] else 0
     if m <= p + k:
-        text = f"{m} values for {p} coefficients and {k} unknowns of the set-up"
+        text = f"{m} values are too few for {p} coefficients and {k} unknowns of the set-up"
         hint = f'measure more poses, or estimate fewer effects: --effects "{LOCATIONS}" asks where axes lie'
         raise UsageError.of("NCF630", text, hint=hint)
 
@@ -332,8 +332,8 @@ def _iterate(problem: Problem, weight: Array, loss: str, scale: float = 1.0) -> 
     if not size < CONVERGED and not (robust and np.abs(change).max() < CLOSE):
         size = float(np.abs(change).max())
         still = f"still change by {size:.3g} times the noise" if size < DIVERGED else "run away"
-        text = f"after {STEPS} steps the predictions {still}"
-        raise UsageError.of("NCF637", text, hint="are the measurements of this machine, in mm and degree?")
+        text = f"after {STEPS} steps, the predictions {still}"
+        raise UsageError.of("NCF637", text, hint="check that the measurements are of this machine, in mm and degrees")
     residual = problem.residual(coefficients, unknowns)
     return Estimate(coefficients, unknowns, solution, residual, weight, least_squares.weighted_share(loss))
 

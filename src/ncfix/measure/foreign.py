@@ -93,7 +93,7 @@ def recognised(text: str, machine: Machine, path: str) -> Measurement | None:
     if reader is renishaw:
         found = of_bodies(found, machine)
     elif reader is not None:
-        hint = "if they count as the axis does, their sign is wrong"
+        hint = "if they are in the counting direction of the axis, their sign is wrong"
         found = replace(found, remarks=(*found.remarks, *backwards(found, machine, "NCF618", hint)))
     return checks.checked(found, machine)
 
@@ -108,7 +108,10 @@ def of_bodies(measurement: Measurement, machine: Machine) -> Measurement:
     for axis, component, rows in _positioned(measurement, machine):
         along = axis.along(component)
         if abs(along) < 1 - SLANTED:
-            text = f"{axis.name} does not move along its error axis: what it is off is no E{component}{axis.name} alone"
+            text = (
+                f"{axis.name} does not move along its error axis, so its deviations are not E{component}{axis.name} "
+                "alone"
+            )
             raise ConfigError.of("NCF618", text, Place(measurement.path), "give the errors as kind axis")
         factor[rows] = np.sign(along)
     return measurement.with_columns({"value": factor * measurement.columns["value"]})
@@ -119,7 +122,7 @@ def backwards(measurement: Measurement, machine: Machine, code: str, hint: str) 
     for axis, component, rows in _positioned(measurement, machine):
         if axis.along(component) < 0:
             own = f"E{component}{axis.name}"
-            text = f"{own} is taken along the base axis, against which {axis.name} moves as its number grows"
+            text = f"{own} is taken along the base axis, but {axis.name} moves against it as its number grows"
             yield Message(code, text, measurement.place(rows[0]), hint)
 
 
@@ -160,7 +163,7 @@ def renishaw(text: str, path: str) -> Measurement:
     axis, rows = file.axis(), Rows(path)
     for readings in file.runs():
         if len(readings) < len(file.targets):
-            said = f"run {readings[0].run} has {len(readings)} of {len(file.targets)} targets"
+            said = f"run {readings[0].run} has only {len(readings)} of {len(file.targets)} targets"
             rows.remarks.append(Message("NCF618", said, Place(path, readings[0].line), "was it cut off?"))
         places = [file.targets[each.target - 1] for each in readings]
         ways = np.sign(np.diff(places))
@@ -182,7 +185,7 @@ def isg(text: str, path: str) -> Measurement:
             continue
         if len(words) != len(names):
             hint = "numbers have a decimal point" if re.search(r"\d,\d", line) else ""
-            text = f"{len(words)} cells, there are {len(names)} columns"
+            text = f"{len(words)} cells, but {len(names)} columns"
             raise ConfigError.of("NCF606", text, Place(path, number, 0, line), hint)
         values = [number_of(word, path, number) for word in words]
         for name, value in zip(components, values[1:], strict=True):
@@ -202,13 +205,15 @@ def _check_isg_names(axis: str, components: Sequence[str], where: Place) -> None
     elif components[0] in LINEAR + "ABC":
         text = "a grid over several axes is a table, not a measurement of one axis"
     elif len(set(components)) < len(components):
-        text = f"a column stands twice: {' '.join(components)}"
+        text = f"a column appears twice: {' '.join(components)}"
     elif others := [name for name in components if ERROR.fullmatch(name) and name[2] != axis]:
-        text = f"{others[0]} beside positions of {axis}"
+        text = f"{others[0]} is not an error of {axis}, whose positions are in the first column"
     elif strangers := [name for name in components if not ERROR.fullmatch(name) and not LOCATION.fullmatch(name)]:
-        text = f"{strangers[0]!r} is no error of {axis}, such as EX{axis}"
+        text = f"{strangers[0]!r} is not an error of {axis}, such as EX{axis}"
     if text:
-        raise ConfigError.of("NCF618", text, where, "mm, degree and rad; other readings go into a file of kind axis")
+        raise ConfigError.of(
+            "NCF618", text, where, "ncfix reads mm, degree and rad; other readings need a file of kind axis"
+        )
 
 
 def etalon(text: str, path: str) -> Measurement:
@@ -229,7 +234,7 @@ def etalon(text: str, path: str) -> Measurement:
             rows.add(section, position, value, number)
         elif words:
             said = (
-                f"not understood: a line is [EXY], position and value of such an error, or VALUE of {section or 'C0B'}"
+                f"invalid line: expected [EXY], or position and value of such an error, or VALUE of {section or 'C0B'}"
             )
             raise ConfigError.of("NCF618", said, Place(path, number, 1, line))
     return rows.measurement("none", "Etalon exchange")
@@ -237,7 +242,7 @@ def etalon(text: str, path: str) -> Measurement:
 
 def _located(name: str, called: str = "") -> str:
     """The remark on a location error in a file of error motions."""
-    return f"[{called or name}] is a location error, not an error motion: put {name} into the machine file"
+    return f"[{called or name}] is a location error, not an error motion: enter {name} in the machine file"
 
 
 def _first_words(text: str) -> list[str]:
@@ -279,16 +284,22 @@ class Rtl:
             raise self.odd(f"the axis is {text!r}" if line else "there is no line `Axis:`", line, "a letter: Axis: X")
         letter = letters.pop()
         if letter in "ABC":
-            said = "the unit of a rotary axis's deviations is not public: give them as kind axis, in rad"
+            said = (
+                "the unit of the deviations of a rotary axis in such files is not published: give them in a file of "
+                "kind axis, in rad"
+            )
             raise self.odd(said, line, "docs/formats.md, Measurement file")
         if ANOTHER_ERROR.fullmatch(suffix := PurePath(self.path).suffix.lower()):
-            said = f"a file {suffix} holds another error than positioning, in a unit that nobody says"
-            raise self.odd(said, line, "give the readings as kind axis, with their component")
+            said = f"a {suffix} file contains another error than positioning, in a unit that is not published"
+            raise self.odd(said, line, "give the readings in a file of kind axis, with their component")
         for key in ("title", "filetype", "location"):
             other, where = self.texts.get(key, ("", 0))
             if OTHER.search(other):
-                said = f"{other!r} speaks of another error than positioning, whose component and unit nobody says"
-                raise self.odd(said, where, "give the readings as kind axis, with their component")
+                said = (
+                    f"{other!r} names another error than positioning; the file states neither its component nor its "
+                    "unit"
+                )
+                raise self.odd(said, where, "give the readings in a file of kind axis, with their component")
         return letter
 
     def checked(self) -> Rtl:
@@ -302,7 +313,7 @@ class Rtl:
         for key, count in counts.items():
             text, line = self.texts.get(key, ("", 0))
             if text.isdecimal() and int(text) != count and self.readings:
-                raise self.odd(f"{key} is {text}, and {count} are there: is a part of the file missing?", line)
+                raise self.odd(f"{key} is {text}, but the file has {count}: is a part of the file missing?", line)
         return self
 
     def runs(self) -> Iterator[list[Deviation]]:
@@ -335,7 +346,7 @@ def _rtl(text: str, path: str) -> Rtl:
 
 def _deviation(file: Rtl, words: list[str], line: int) -> Deviation:
     if len(words) != 3 or not words[0].isdecimal() or not words[1].isdecimal():
-        raise file.odd("not a line of run, target and deviation", line, "three numbers: 1 12 -0.8")
+        raise file.odd("not a line with run, target and deviation", line, "three numbers: 1 12 -0.8")
     return Deviation(int(words[0]), int(words[1]), number_of(words[2], file.path, line) * MICROMETRE, line)
 
 

@@ -51,8 +51,11 @@ def observe(measurement: Measurement, machine: Machine) -> Observation:
     sets = len(set(zip(measurement.sets, *zeros, strict=True)))
     values, unknowns = 3 * len(measurement), UNKNOWNS * sets + 3 * sum(names)
     if values * unknowns > MAX_ELEMENTS and sets > FEW_SETS:
-        text = f"{sets} sets of {len(measurement)} rows: some {unknowns} unknowns of set-ups, too many to work out"
-        hint = "rows that were measured in one set-up have one and the same `set`"
+        text = (
+            f"{sets} sets in {len(measurement)} rows: about {unknowns} unknowns of set-ups, which are too many to "
+            "compute"
+        )
+        hint = "give all rows that were measured in one set-up the same `set`"
         raise UsageError.of("NCF624", text, measurement.place(0), hint)
     if measurement.kind == "length":
         return (BallBar if "radius" in measurement.columns else Gauge)(measurement, machine)

@@ -50,7 +50,7 @@ MOST_SETS = 12
 """Largest number of sets of a file that are tried one by one."""
 TURN_RAD = 2 * np.pi + 0.01
 """Largest position, in radians, of an axis that may have been given in radians."""
-OTHER_SIGN = "which way was the instrument set up there?"
+OTHER_SIGN = "check the direction of the instrument in this set-up"
 
 
 @frozen(slots=False)
@@ -114,7 +114,7 @@ def suspected(problem: Problem) -> tuple[Message, ...]:
     small = problem.noise_known and before < LARGE
     if small or ratio > enough or count * fdtr(values, values, ratio) > CHANCE:
         return ()
-    text = f"{found.text}: that explains {100 * (1 - ratio):.0f} % of what is left{' there' if found.rows else ''}"
+    text = f"{found.text}: this explains {100 * (1 - ratio):.0f} % of the residual{' there' if found.rows else ''}"
     return (Message("NCF617", text, found.measurement.place(0), found.hint),)
 
 
@@ -129,7 +129,10 @@ def _scattered(data: Sequence[Measurement], machine: Machine) -> tuple[Message, 
             continue
         after = _spread(each.measurement, machine)
         if after < GATHERED_MM and after < GATHERED * _spread(before, machine):
-            text = f"{each.text}: the tip stays at one place in each set then, as on a ball, and goes about as it is"
+            text = (
+                f"{each.text}: then the tip stays at one point in each set, as on a ball; with the file as it is, it "
+                "moves about"
+            )
             return (Message("NCF617", text, before.place(0), each.hint),)
     return ()
 
@@ -212,7 +215,7 @@ def _units(file: int, measurement: Measurement, machine: Machine) -> Iterator[Su
     there = [axis.name for axis in machine.axes if axis.rotary and np.ptp(measurement.column(axis.name)) > 0]
     small = [name for name in there if np.abs(measurement.column(name)).max() <= TURN_RAD]
     for names in [(name,) for name in small] + ([tuple(small)] if len(small) > 1 else []):
-        text = f"the positions of {' and '.join(names)} look like radians: degrees are asked for"
+        text = f"the positions of {' and '.join(names)} look like radians; they must be in degrees"
         yield Suspect(text, "multiply them by 180 / pi", file, measurement.times(names, 180 / np.pi))
 
 
@@ -221,8 +224,8 @@ def _turned(file: int, measurement: Measurement, machine: Machine) -> Iterator[S
     for axis, right in product(machine.axes, perhaps_right([measurement])):
         name = axis.name
         if any(np.ptp(measurement.columns[each]) > 0 for each in measurement.columns_of(name)):
-            text = f"{name} is turned round: with its positions of the other sign the readings are explained"
-            hint = f"see `direction` of {name} in the machine file, or the sign of its column"
+            text = f"{name} has the opposite sign: with its positions of the other sign, the readings are explained"
+            hint = f"check `direction` of {name} in the machine file, and the sign of its column"
             yield Suspect(text, hint, file, measurement.times([name], -1.0, right))
 
 
@@ -233,7 +236,7 @@ def _swapped(file: int, measurement: Measurement, machine: Machine) -> Iterator[
         for (first, second), right in product(combinations(names, 2), perhaps_right([measurement])):
             if (changed := measurement.exchanged(first, second, right)) is not None:
                 mine, other = (", ".join(measurement.columns_of(name, right)) for name in (first, second))
-                text = f"the columns {mine} and {other} look exchanged"
+                text = f"the columns {mine} and {other} seem to be exchanged"
                 yield Suspect(text, "exchange their names", file, changed)
 
 
@@ -247,12 +250,12 @@ def _series(file: int, measurement: Measurement, files: int) -> Iterator[Suspect
     for title, rows in parts:
         if measurement.kind == "length":
             lengths = np.where(rows, measurement.columns["length"], 0.0)
-            text = f"the lengths of {title} and the others cannot all be true: they are of another scale"
-            hint = "which length standard is right? Leave the other out, or say `# setup: unknown`"
+            text = f"the lengths of {title} differ from the others by a scale factor"
+            hint = "leave out the wrong length standard, or write `# setup: unknown` in the header"
             yield Suspect(text, hint, file, measurement, scaled=lengths, rows={file: rows})
         elif measurement.kind in ("tcp", "tcp6", "axis"):
             columns = {name: np.where(rows, -1.0, 1.0) * measurement.columns[name] for name in measurement.measured}
-            text = f"the readings of {title} have the other sign than the others"
+            text = f"the readings of {title} have the opposite sign to the others"
             yield Suspect(text, OTHER_SIGN, file, measurement.with_columns(columns), rows={file: rows})
 
 
@@ -352,7 +355,7 @@ def _negated(data: Sequence[Measurement], readings: _Readings) -> Iterator[tuple
         turned.append(best)
     if len(turned) > 1:
         names = ", ".join(name for _, name in sorted(turned))
-        text = f"the readings of sets {names} have the other sign than the others"
+        text = f"the readings of the sets {names} have the opposite sign to the others"
         file = min(turned)[0]
         rows: dict[int, Mask] = {}
         for each in turned:
@@ -363,11 +366,11 @@ def _negated(data: Sequence[Measurement], readings: _Readings) -> Iterator[tuple
 def _look(names: Sequence[str], order: tuple[int, ...], signs: tuple[int, ...]) -> Suspect:
     wanted = [f"{'-' if sign < 0 else ''}{names[k]}" for k, sign in zip(order, signs, strict=True)]
     turned = [names[k][-1] for k in range(len(names)) if signs[k] < 0]
-    hint = "which way do the instrument's axes point?"
-    text = f"the columns {', '.join(names)} look exchanged: {', '.join(wanted)} fit much better"
+    hint = "check the directions of the instrument's axes"
+    text = f"the columns {', '.join(names)} seem to be exchanged: {', '.join(wanted)} fit much better"
     if order == tuple(range(len(names))):
         which = " and ".join(turned)
-        text = f"the sign of {' and '.join(names[k] for k in range(len(names)) if signs[k] < 0)} looks wrong: "
+        text = f"the sign of {' and '.join(names[k] for k in range(len(names)) if signs[k] < 0)} seems to be wrong: "
         text += f"{', '.join(wanted)} fit much better"
-        hint = f"the instrument's {which} {'axis is' if len(turned) == 1 else 'axes are'} turned round"
+        hint = f"the instrument's {which} {'axis is' if len(turned) == 1 else 'axes are'} in the opposite direction"
     return Suspect(text, hint, 0, Measurement("tcp", (), {}))

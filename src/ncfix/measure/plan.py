@@ -104,8 +104,8 @@ def plan(
     many = max(CANDIDATES, 3 * count)
     poses = offered(machine, kind, many, room, seed)
     if count >= len(poses):
-        text = f"{count} poses of {len(poses)} that can be reached"
-        raise UsageError.of("NCF636", text, hint="a smaller --count, or wider ranges")
+        text = f"{count} poses are asked for, but only {len(poses)} can be reached"
+        raise UsageError.of("NCF636", text, hint="give a smaller --count, or wider ranges")
     fixed = 0 if existing is None else len(existing)
     every = poses if existing is None else appended(existing, poses)
     pool, kept = pool_of(observe(every, machine), machine, selection, room, separate, seed)
@@ -137,25 +137,27 @@ def _can_be_set(machine: Machine, selection: Selection, room: Room, existing: Me
     """Refuse effects that depend on a state which a plan cannot set: NCF636 for time lags and unknown inputs."""
     late = [effect for effect in selection.estimated if effect.time_constant_s]
     if late:
-        text = f"{late[0].name} follows {late[0].input} after a time: where to stand at which hour is not planned"
-        hint = "leave it out of --effects; read the sensor over a warm-up and a cool-down instead"
+        text = f"{late[0].name} follows {late[0].input} with a time constant; measurements over time cannot be planned"
+        hint = "leave it out of --effects; measure it over a warm-up and a cool-down instead"
         raise UsageError.of("NCF636", text, hint=hint)
     known = {*machine.axis_names, *room.inputs, "tool_length"}
     needed = [name for effect in selection.estimated for name in (effect.signal, effect.times) if name]
     unset = [name for name in dict.fromkeys(needed) if name not in known]
     if unset:
-        text = f"what is sought depends on {', '.join(unset)}, and a plan cannot know what that will be"
-        raise UsageError.of("NCF636", text, hint=f"--input {unset[0]}=LOW,HIGH if it can be set, or leave it out")
+        text = f"the effects depend on {', '.join(unset)}, whose values during the measurement are not known"
+        raise UsageError.of(
+            "NCF636", text, hint=f"give --input {unset[0]}=LOW,HIGH if it can be set, or leave the effect out"
+        )
     missing = [] if existing is None else [name for name in room.inputs if name not in existing.columns]
     if missing:
-        text = f"the poses measured already do not say {missing[0]}"
-        raise UsageError.of("NCF636", text, hint=f"give them a column {missing[0]}")
+        text = f"the existing measurement has no column {missing[0]}"
+        raise UsageError.of("NCF636", text, hint=f"add a column {missing[0]} to it")
 
 
 def appended(first: Measurement, last: Measurement) -> Measurement:
     """Two measurements of one kind joined; a missing column is filled with zeros."""
     if first.kind != last.kind:
-        text = f"the poses measured already are of kind {first.kind}, not {last.kind}"
+        text = f"the existing measurement is of kind {first.kind}, not {last.kind}"
         raise UsageError.of("NCF636", text, hint=f"--kind {first.kind}")
     names = [name for name in dict.fromkeys([*first.columns, *last.columns]) if name not in _values(first)]
     columns = {name: np.concatenate([first.column(name), last.column(name)]) for name in names}
@@ -186,8 +188,8 @@ def pool_of(
     nuisance = seen.unknown_design(seen.unknowns.start)[:rows] / noise
     kept = solve(design, nuisance, np.zeros(rows)).kept
     if not len(kept):
-        text = "no pose of this kind tells anything of what is sought from what else is unknown"
-        raise UsageError.of("NCF636", text, hint="another --kind, other --effects, or wider ranges")
+        text = "no pose of this kind distinguishes any of the effects from the other unknowns"
+        raise UsageError.of("NCF636", text, hint="give another --kind, other --effects, or wider ranges")
     whole = np.concatenate([design[:, kept], _full_rank(nuisance)], axis=1)
     scale = np.linalg.norm(whole, axis=0) / np.sqrt(len(seen.measurement))
     targets = _targets(machine, selection, kept, room, separate, seed)
@@ -215,8 +217,8 @@ def _targets(
         chosen = np.flatnonzero(np.isin(kept, columns))
         lost = ", ".join(selection.labels[k] for k in columns if k not in kept)
         if lost or not columns:
-            text = f"no pose of this kind tells {lost or separate} from what else is unknown"
-            raise UsageError.of("NCF636", text, hint="another kind of measurement, or more tool lengths")
+            text = f"no pose of this kind distinguishes {lost or separate} from the other unknowns"
+            raise UsageError.of("NCF636", text, hint="use another kind of measurement, or more tool lengths")
         return np.eye(len(kept))[chosen]
     places = candidates(machine, "tcp", PLACES, room, seed + 1)
     tip = machine.design(places.positions(machine), places.state(machine), selection.estimated)[:, :3]
@@ -230,8 +232,8 @@ def _columns(machine: Machine, selection: Selection, name: str) -> list[int]:
     owners = [effect for effect in selection.estimated for _ in range(effect.basis.size)]
     found = [k for k, effect in enumerate(owners) if effect.name == name or form(effect) in forms]
     if not found:
-        text = f"{name} is none of the effects that are estimated"
-        raise UsageError.of("NCF636", text, hint="name it in --effects too")
+        text = f"{name} is not among the effects that are estimated"
+        raise UsageError.of("NCF636", text, hint="also name it in --effects")
     return found
 
 

@@ -33,15 +33,18 @@ ONCE = ("ncfix-measurement", "kind", "noise_um", "noise_urad", "point", "frame",
 NAMED = {"distance": (2, 2), "target": (1, 3)}
 """Header key -> numbers of names and of numbers in its value, such as `distance: 1 2 304.6686 0.0012`."""
 COMMA = re.compile(r"[-+]?\d+,\d+")
-NOT_READ = "leave out a row in which this was not read"
+NOT_READ = "leave out the row if this was not read"
 UNITS = r"mm|cm|m|in|inch|deg|degrees?|\u00b0|m?rad|[u\u00b5\u03bc](?:m|rad)|arcsec|as|\"|''|s|sec"
 """As units are written; the micro sign has two characters."""
 ODD_CELLS = (
     (re.compile(r"-+|\.+|\?+|[nN][/.]?[aA]\.?|#.*|(?i:[-+]?nan|null|none|missing|error|inf)"), NOT_READ),
-    (re.compile(rf"[\[(]?({UNITS})[\])]?"), "leave out the line with units: lengths are mm, angles of axes degree"),
-    (re.compile(rf"[-+]?[\d.,]+\s*({UNITS})"), "a cell has the number alone: lengths are mm, angles of axes degree"),
-    (re.compile(r"[-+]?\d{1,3}(?:[.,'\s\u2019]\d{3})+(?:[.,]\d*)?"), "write it without marks of thousands"),
-    (re.compile(r"[\u2010-\u2015\u2212][\d.,]+"), "a minus is written -"),
+    (re.compile(rf"[\[(]?({UNITS})[\])]?"), "remove the line with units: lengths are in mm, angles of axes in degrees"),
+    (
+        re.compile(rf"[-+]?[\d.,]+\s*({UNITS})"),
+        "write the number without a unit: lengths are in mm, angles of axes in degrees",
+    ),
+    (re.compile(r"[-+]?\d{1,3}(?:[.,'\s\u2019]\d{3})+(?:[.,]\d*)?"), "write it without thousands separators"),
+    (re.compile(r"[\u2010-\u2015\u2212][\d.,]+"), "write a minus sign as -"),
 )
 """Cells that are no numbers, as instruments and people write them, and what helps."""
 NAME_AND_UNIT = re.compile(rf"(\w+?)[\s_/]*[\[(]?\s*({UNITS})\s*[\])]?")
@@ -87,7 +90,7 @@ def _sensed(measurement: Measurement, machine: Machine) -> Measurement:
         return foreign.of_bodies(measurement, machine).with_header("sense", "body")
     if any(key == "sense" for key, _ in measurement.headers):
         return measurement
-    remarks = foreign.backwards(measurement, machine, "NCF626", "a line `# sense: axis` or `# sense: body` says which")
+    remarks = foreign.backwards(measurement, machine, "NCF626", "add a line `# sense: axis` or `# sense: body`")
     return replace(measurement, remarks=(*measurement.remarks, *remarks))
 
 
@@ -99,7 +102,7 @@ def _measurement(text: MeasurementLines, machine: Machine, plan: bool) -> Measur
     _check_header(text, pairs, kind)
     start = next((i for i, line in enumerate(text.lines) if line.strip() and not line.startswith("#")), None)
     if start is None:
-        text.note("NCF609", "there are no columns and no rows", len(text.lines))
+        text.note("NCF609", "the file has no columns and no rows", len(text.lines))
         text.stop()
     assert start is not None
     _note_stray(text, start, kind)
@@ -121,8 +124,11 @@ def _open_end(text: MeasurementLines, last: list[Cell]) -> tuple[Message, ...]:
     if not text.open_end or len(last) < 2 or decimals[-1] >= min(decimals[:-1]):
         return ()
     place = Place(text.path, last[-1].line, last[-1].column, text.lines[last[-1].line - 1])
-    said = f"the file ends within a line, and {last[-1].text!r} has fewer decimals than the numbers above it"
-    return (Message("NCF619", said, place, "was the file cut off? A line end behind it says that it was not"),)
+    said = (
+        f"the file ends within a line, and its last number, {last[-1].text!r}, has fewer decimals than the numbers "
+        "above it"
+    )
+    return (Message("NCF619", said, place, "check whether the file was cut off; if not, add a line end"),)
 
 
 @mutable
@@ -174,8 +180,8 @@ def _note_stray(text: MeasurementLines, start: int, kind: str) -> None:
     for number, line in enumerate(text.lines[start:], start + 1):
         key, colon, _ = line.removeprefix("#").partition(":")
         if line.startswith("#") and colon and key.strip() in (*COMMON, *KINDS[kind].headers):
-            hint = "header lines stand above the columns"
-            text.note("NCF602", f"header line {key.strip()!r} below the columns", number, 1, hint)
+            hint = "move it above the line of columns"
+            text.note("NCF602", f"header line {key.strip()!r} is below the columns", number, 1, hint)
 
 
 def _kind_of(text: MeasurementLines, pairs: list[tuple[Cell, Cell]]) -> str:
@@ -184,12 +190,16 @@ def _kind_of(text: MeasurementLines, pairs: list[tuple[Cell, Cell]]) -> str:
     version = found.get("ncfix-measurement")
     if version is None:
         kinds = _kinds_by_columns(text)
-        hint = "an instrument's table needs it above its columns, with `# kind: ...`: docs/guide/calibrate.md"
+        hint = (
+            "to use the table of an instrument, add it above the columns, with `# kind: ...`: docs/guide/calibrate.md"
+        )
         if kinds:
-            hint = f"above the columns, with `# kind: {kinds}`; lengths are mm, angles of axes degree"
+            hint = f"add it above the columns, with `# kind: {kinds}`; lengths are in mm, angles of axes in degrees"
         text.note("NCF600", "there is no line `# ncfix-measurement: 1`", 1 if text.lines else 0, 0, hint)
     elif version.text != str(VERSION):
-        text.mark(version, "NCF600", f"version {version.text!r}, this ncfix reads {VERSION}")
+        text.mark(
+            version, "NCF600", f"version {version.text!r} of the measurement file; this ncfix reads version {VERSION}"
+        )
     kind = found.get("kind")
     if kind is None:
         text.note("NCF601", "there is no line `# kind: ...`", 1 if text.lines else 0, 0, f"one of {', '.join(KINDS)}")
@@ -214,10 +224,10 @@ def _check_header(text: MeasurementLines, pairs: list[tuple[Cell, Cell]], kind: 
     said: set[str] = set()
     for key, value in pairs:
         if key.text in said and key.text in ONCE:
-            text.mark(key, "NCF602", f"header line {key.text!r} is there twice")
+            text.mark(key, "NCF602", f"header line {key.text!r} appears twice")
         said.add(key.text)
         if key.text not in known:
-            hint = did_you_mean(key.text, known) or f"notes go under {', '.join(COMMON[4:])}"
+            hint = did_you_mean(key.text, known) or f"free notes belong under {', '.join(COMMON[4:])}"
             text.mark(key, "NCF602", f"unknown header line {key.text!r}", hint)
         elif key.text in NUMBERS:
             _header_numbers(text, value, key.text, NUMBERS[key.text])
@@ -225,26 +235,26 @@ def _check_header(text: MeasurementLines, pairs: list[tuple[Cell, Cell]], kind: 
             _named(text, value, key.text, *NAMED[key.text])
         elif kind in CHOICES.get(key.text, {}) and value.text not in CHOICES[key.text][kind]:
             one = " or ".join(CHOICES[key.text][kind])
-            text.mark(value, "NCF603", f"{key.text} is {one}, not {value.text!r}")
+            text.mark(value, "NCF603", f"{key.text} must be {one}, not {value.text!r}")
 
 
 def _header_numbers(text: MeasurementLines, value: Cell, key: str, count: int) -> None:
     found = [_finite(part) for part in value.text.split()]
     if len(found) != count or any(number is None for number in found):
         wanted = "a number" if count == 1 else f"{count} numbers"
-        hint = "a number has a decimal point, not a comma" if COMMA.search(value.text) else ""
-        text.mark(value, "NCF603", f"{key} is {wanted}, not {value.text!r}", hint)
+        hint = "write numbers with a decimal point, not a comma" if COMMA.search(value.text) else ""
+        text.mark(value, "NCF603", f"{key} must be {wanted}, not {value.text!r}", hint)
     elif key.startswith("noise") and (found[0] or 0.0) <= 0:
-        text.mark(value, "NCF603", f"{key} is above zero, not {value.text}")
+        text.mark(value, "NCF603", f"{key} must be above zero, not {value.text}")
 
 
 def _named(text: MeasurementLines, value: Cell, key: str, names: int, numbers: int) -> None:
     parts = value.text.split()
     if len(parts) != names + numbers or any(_finite(part) is None for part in parts[names:]):
         wanted = f"{names} names and {numbers} numbers"
-        text.mark(value, "NCF603", f"{key} is {wanted}, not {value.text!r}")
+        text.mark(value, "NCF603", f"{key} must be {wanted}, not {value.text!r}")
     elif key == "distance" and min(float(part) for part in parts[names:]) <= 0:
-        text.mark(value, "NCF603", "a distance and its uncertainty are above zero")
+        text.mark(value, "NCF603", "a distance and its uncertainty must be above zero")
 
 
 def _finite(text: str) -> float | None:
@@ -267,7 +277,7 @@ def _check_names(
     seen: set[str] = set()
     for name in names:
         if name.text in seen:
-            text.mark(name, "NCF604", f"column {name.text!r} is there twice")
+            text.mark(name, "NCF604", f"column {name.text!r} appears twice")
         seen.add(name.text)
         if name.text not in known and not STATES.fullmatch(name.text):
             _unknown_name(text, name, known, form, machine)
@@ -276,17 +286,19 @@ def _check_names(
     if form.name == "probe" or (form.name == "length" and "ax" in seen):
         instead = "mx, my, mz" if form.name == "probe" else "ax, ay, az and bx, by, bz"
         for name in (name for name in names if name.text in ("X", "Y", "Z")):
-            text.mark(name, "NCF604", f"column {name.text!r} beside {instead}, which say it")
+            text.mark(
+                name, "NCF604", f"column {name.text!r} is not possible together with {instead}, which give the same"
+            )
     _check_missing(text, seen, form, names[0].line, plan)
 
 
 def _check_missing(text: MeasurementLines, seen: set[str], form: MeasurementKind, line: int, plan: bool) -> None:
     wanted = form.required if plan or form.any_of else (*form.required, *form.measured)
     for missing in [each for each in wanted if each not in seen]:
-        text.note("NCF605", f"kind {form.name} has a column {missing!r}", line)
+        text.note("NCF605", f"kind {form.name} needs a column {missing!r}", line)
     if form.any_of and not plan and not seen & set(form.measured):
         one = ", ".join(form.measured)
-        text.note("NCF605", f"kind {form.name} has at least one of {one}", line)
+        text.note("NCF605", f"kind {form.name} needs at least one of {one}", line)
 
 
 def _unknown_name(text: MeasurementLines, name: Cell, known: set[str], form: MeasurementKind, machine: Machine) -> None:
@@ -296,11 +308,13 @@ def _unknown_name(text: MeasurementLines, name: Cell, known: set[str], form: Mea
         text.mark(name, "NCF610", f"the machine has no axis {axis}, only {has}")
         return
     if not name.text:
-        text.mark(name, "NCF604", "a column without a name", "is there a separator too many at the end of the line?")
+        text.mark(name, "NCF604", "a column without a name", "remove a separator at the end of the line")
         return
     hint = did_you_mean(name.text, known) or f"kind {form.name} has {', '.join(form.columns)}"
     if (unit := NAME_AND_UNIT.fullmatch(name.text)) and unit[1] in known:
-        hint = f"call it {unit[1]}, without a unit: lengths are mm, angles of axes degree, measured angles rad"
+        hint = (
+            f"name it {unit[1]}, without a unit: lengths are in mm, angles of axes in degrees, measured angles in rad"
+        )
     text.mark(name, "NCF604", f"unknown column {name.text!r}", hint)
 
 
@@ -308,7 +322,7 @@ def _check_length_form(text: MeasurementLines, seen: set[str], line: int) -> Non
     gauge, bar = set(ENDS), {*CENTRE, "radius"}
     if not (gauge <= seen and not bar & seen) and not (bar <= seen and not gauge & seen):
         forms = "ax,ay,az,bx,by,bz,length[,nominal] or cx,cy,cz,radius,length"
-        text.note("NCF605", f"kind length has the columns {forms}", line)
+        text.note("NCF605", f"kind length needs the columns {forms}", line)
 
 
 def _rows(text: MeasurementLines, names: list[Cell], start: int) -> list[list[Cell]]:
@@ -318,11 +332,15 @@ def _rows(text: MeasurementLines, names: list[Cell], start: int) -> list[list[Ce
             continue
         cells = text.separated.cells(line, number)
         if len(cells) != len(names):
-            hint = "a number has a decimal point, not a comma" if COMMA.search(line) and len(cells) > len(names) else ""
-            text.note("NCF606", f"{len(cells)} cells, there are {len(names)} columns", number, 0, hint)
+            hint = (
+                "write numbers with a decimal point, not a comma"
+                if COMMA.search(line) and len(cells) > len(names)
+                else ""
+            )
+            text.note("NCF606", f"{len(cells)} cells, but {len(names)} columns", number, 0, hint)
         rows.append(cells)
     if not rows:
-        text.note("NCF609", "there are columns but no rows", start + 1)
+        text.note("NCF609", "the file has columns but no rows", start + 1)
     return rows
 
 
@@ -336,7 +354,7 @@ def _columns(
         if name in form.measured and not any(cell.text for cell in cells):
             if not plan:
                 said = f"column {name!r} is empty in all rows"
-                text.mark(cells[0], "NCF607", said, "fill it in, or leave it out if it was not measured")
+                text.mark(cells[0], "NCF607", said, "fill it in, or remove it if it was not measured")
             columns |= {name: np.full(len(cells), math.nan)} if form.any_of or not plan else {}
             continue
         if name in (*LABELS, *form.labels):
@@ -372,11 +390,11 @@ def _number(text: MeasurementLines, cell: Cell, name: str) -> float:
         if name == "direction" or name.startswith("dir_"):
             hint = "1 towards plus, -1 towards minus, 0 not known"
         elif cell.text == name:
-            hint = "leave out this line: the columns are named once"
+            hint = "remove this line: the columns are named once"
         text.mark(cell, "NCF608", f"column {name!r}: {cell.text!r} is not a number", hint)
         return math.nan
     if not math.isfinite(value):
         text.mark(cell, "NCF608", f"column {name!r}: {cell.text} is not a finite number", NOT_READ)
     elif abs(value) > MAX_NUMBER:
-        text.mark(cell, "NCF608", f"column {name!r}: {cell.text} is more than anything that is measured")
+        text.mark(cell, "NCF608", f"column {name!r}: {cell.text} is larger than any measured value")
     return value

@@ -205,8 +205,12 @@ def with_time_constants(
 
     constants = sorted({effect.time_constant_s for effect in selection.estimated if effect.time_constant_s})
     if not constants:
-        text = "no effect that is estimated has a time constant"
-        raise UsageError.of("NCF639", text, hint="for example spindle-growth-late; `time_constant_s` in a machine file")
+        text = "none of the estimated effects has a time constant"
+        raise UsageError.of(
+            "NCF639",
+            text,
+            hint="estimate for example spindle-growth-late, or give an effect `time_constant_s` in the machine file",
+        )
     low, high = _times(measurements)
 
     def left(logs: Array) -> float:
@@ -235,7 +239,9 @@ def _times(measurements: Sequence[Measurement]) -> tuple[float, float]:
     times = [np.unique(each.columns["time_s"]) for each in measurements if "time_s" in each.columns]
     spans = [float(np.ptp(each)) for each in times if len(each) > 1]
     if not spans:
-        raise UsageError.of("NCF639", "no column says the time", hint="a lag needs a column time_s")
+        raise UsageError.of(
+            "NCF639", "there is no column time_s", hint="a time constant needs the times of the rows in a column time_s"
+        )
     steps = [float(np.median(np.diff(each))) for each in times if len(each) > 1]
     return max(min(steps) / 3, 1e-3), 3 * max(spans)
 
@@ -264,6 +270,6 @@ def _words(selection: Selection, constant: float, sigma: float, limits: tuple[fl
     late = [effect for effect in selection.estimated if effect.time_constant_s == constant]
     text = f"{', '.join(each.name for each in late)} follows {late[0].input} with a time constant of "
     if sigma > 0.5 or not limits[0] * 1.01 < constant < limits[1] / 1.01:
-        text += f"about {constant:.3g} s, which these times do not tell"
-        return Message("NCF639", text, hint="measure over several time constants, warming and cooling")
+        text += f"about {constant:.3g} s, which these measurements do not determine"
+        return Message("NCF639", text, hint="measure over several time constants, while warming up and cooling down")
     return Message("NCF640", f"{text}{constant:.4g} s, sigma {constant * sigma:.2g} s")

@@ -243,7 +243,7 @@ class Model:
         found += [effect for text in self.motions.split() for effect in _terms(machine, text)]
         missing = {effect.joint for effect in found} - {*machine.axis_names, SPINDLE}
         if missing:
-            text = f"the model {self.name} is for machines with the axes {' '.join(sorted(missing))}"
+            text = f"the model {self.name} needs a machine with the axes {' '.join(sorted(missing))}"
             raise UsageError.of("NCF635", text, hint=f"this machine has {' '.join(machine.axis_names)}")
         return found
 

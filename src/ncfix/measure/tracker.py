@@ -142,10 +142,15 @@ class Targets(Observation):
         if size > 1:
             most = 1e3 * max(float(np.abs(each).max()) for each in levers)
             text = (
-                f"the readings do not tell where the targets are on what carries them; {LEVER:g} mm elsewhere, "
-                f"the estimated angles would move them by up to {most:.1f} um more or less"
+                f"the readings do not determine where the targets are on the body that carries them; if they are "
+                f"{LEVER:g} mm elsewhere, the estimated angles move them by up to {most:.1f} um more or less"
             )
-            yield Message("NCF643", text, self.measurement.place(0), "a line `# target: NAME x y z` in the header")
+            yield Message(
+                "NCF643",
+                text,
+                self.measurement.place(0),
+                "give the position of one target in the header: `# target: NAME x y z`",
+            )
 
     def _parts(self, unknowns: Array) -> tuple[Array, Array, Array]:
         t, s = len(self.names), len(self.set_names)

@@ -55,9 +55,9 @@ def machine_sections(machine: Machine, path: str) -> list[ReportSection]:
     about = Table((), [("file", path), ("hash", machine.hash), *facts(machine).items()])
     head = ReportSection(machine.name, [about, chain])
     if machine.is_perfect:
-        return [head, ReportSection("Errors", [Paragraph("None: a perfect machine.")])]
+        return [head, ReportSection("Errors", [Paragraph("None.")])]
     words = (
-        "Actual minus nominal position of the tool tip in the workpiece frame, as one axis moves and the others stand "
+        "Actual minus nominal position of the tool tip in the workpiece frame, as one axis moves and the others are "
         "in the middle of their travel; tool length zero, approached from below"
     )
     rest = ", ".join(f"{name} at {value:g}" for name, value in rest_of(machine).items())
@@ -91,7 +91,7 @@ def _size(machine: Machine, effect: Effect) -> str:
     factor, unit = _unit(effect)
     found = extent(machine, effect)
     if found is None:
-        return "not known from the file"
+        return "not known: depends on an input or an axis without range"
     low, high = (factor * value for value in found)
     sigma = ""
     if effect.covariance is not None and len(effect.coefficients) == 1:
@@ -167,9 +167,9 @@ def _calibration(rows: Sequence[Result]) -> Iterator[Part]:
         cells.append((row["name"], f"{factor * row['value']:.4g}", *known, unit))
     yield from _limited(("coefficient", "value", "u (k = 1)", "U (k = 2)", "unit"), cells)
     yield Paragraph(
-        "u is the standard uncertainty, U the expanded one. They come from the noise and the fit alone: what the "
-        "calibration of the instrument and its surroundings add is not in them. A coefficient that multiplies a "
-        "temperature, a load or a time is per K, kg or s."
+        "u is the standard uncertainty, U the expanded uncertainty. They contain the noise and the fit only, not the "
+        "calibration of the instrument or its environment. A coefficient that multiplies a temperature, a load or a "
+        "time is per K, kg or s."
     )
 
 

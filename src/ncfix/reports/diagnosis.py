@@ -87,7 +87,7 @@ def _verdict(diagnosis: Diagnosis) -> ReportSection:
 def _waterfall(diagnosis: Diagnosis) -> Iterator[Part]:
     """What each rung of the ladder leaves, as bars and as a table."""
     rungs = ladder(diagnosis)
-    caption = "What is left below each rung, um rms, with the set-up fitted."
+    caption = "Residual below each rung, um rms, with the set-up fitted."
     yield Bars(caption, [rung.name for rung in rungs], [rung.left_um for rung in rungs])
     yield Table(HEAD, in_words(rungs))
 
@@ -96,11 +96,11 @@ def _chances(diagnosis: Diagnosis) -> Iterator[Part]:
     """Whether the gap is larger than noise explains."""
     if diagnosis.p_lack is None or diagnosis.p_left is None:
         yield Paragraph(
-            "Whether what is left is more than noise cannot be said: there are no repeats and no stated noise."
+            "Whether the residual exceeds the noise is not known: there are no repeats and no stated noise."
         )
         return
     before, after = _chance(diagnosis.p_lack), _chance(diagnosis.p_left)
-    yield Paragraph(f"Noise alone would leave a gap as large as before with {before}, after with {after}.")
+    yield Paragraph(f"Noise alone would give a gap as large as before with {before}, as after with {after}.")
 
 
 def _chance(p: float) -> str:
@@ -110,7 +110,9 @@ def _chance(p: float) -> str:
 def _moved(diagnosis: Diagnosis) -> Iterator[Part]:
     """Constants of the machine file (positions of axes, gains) that the data contradict."""
     if diagnosis.moved:
-        yield Paragraph("Constants of the machine file that the data put elsewhere (the gap before has them there):")
+        yield Paragraph(
+            "Constants of the machine file with another value by the data (the gap before is with that value):"
+        )
         yield Table((), [(constant(each),) for each in diagnosis.moved])
         yield from (Paragraph(f"{each[0].upper()}{each[1:]}.") for each in held(diagnosis))
 
@@ -119,7 +121,7 @@ def _finding(diagnosis: Diagnosis, finding: EffectFinding) -> ReportSection:
     candidate = finding.candidate
     parts: list[Part] = [Paragraph(f"{candidate.title}. {why(diagnosis, finding)}.")]
     if finding.aliases:
-        parts.append(Paragraph(f"With these data it may as well be: {', '.join(finding.aliases)}."))
+        parts.append(Paragraph(f"These explain the data equally well: {', '.join(finding.aliases)}."))
     if candidate.remedy:
         parts.append(Paragraph(f"Remedy: {candidate.remedy}."))
     parts += [
@@ -161,8 +163,8 @@ class MeasuredCurve:
     def plot(self) -> Plot:
         """The curve as a plot of the report."""
         caption = (
-            f"{self.title}: {self.component}, um over {self.over}, with everything else taken off; "
-            "means of neighbouring rows, band: two standard errors of what was measured"
+            f"{self.title}: {self.component}, um over {self.over}, all other effects removed; means of neighbouring "
+            "rows, band: two standard errors of the measured means"
         )
         drawn = [Line(self.x, self.measured, self.spread, "measured"), Line(self.x, self.model, None, "model")]
         return Plot(caption, drawn)
@@ -212,8 +214,8 @@ def _ways(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[tuple[str, M
     data, axis = diagnosis.data, finding.candidate.axis
     side = data.column(f"dir_{axis}") if axis else np.zeros(data.count)
     if any(effect.basis.needs_direction for effect in finding.effects) and np.ptp(side) > 0:
-        yield f", {axis} moving in plus", side > 0
-        yield f", {axis} moving in minus", side < 0
+        yield f", {axis} moving towards plus", side > 0
+        yield f", {axis} moving towards minus", side < 0
     else:
         yield "", np.ones(data.count, dtype=bool)
 
@@ -284,7 +286,7 @@ def _arrows(diagnosis: Diagnosis) -> Iterator[Part]:
         at = np.stack([own[np.searchsorted(data.row[own], rows)] for own in parts], axis=1)
         x, y = (data.q[rows, data.machine.axis_names.index(each)] for each in (first, second))
         shifts = {"before": diagnosis.before[at], "after": diagnosis.after[at]}
-        caption = f"What is measured beyond the model in the plane of {first} and {second}, {len(rows)} poses."
+        caption = f"Measured minus modelled values in the plane of {first} and {second}, {len(rows)} poses."
         yield ArrowMap(caption, f"{first}, mm", f"{second}, mm", x, y, shifts, "um")
 
 
@@ -300,9 +302,7 @@ def _folded(diagnosis: Diagnosis, finding: EffectFinding) -> Iterator[Part]:
     own &= diagnosis.case.kept
     place = data.q[data.row[own], data.machine.axis_names.index(axis.name)] / axis.unit
     phase, rest = np.mod(place, wave.basis.period), (diagnosis.after + finding.shown)[own]
-    caption = (
-        f"um over {axis.name}, mm, folded by the pitch of {wave.basis.period:g} mm: with everything else taken off"
-    )
+    caption = f"um over {axis.name}, mm, folded by the pitch of {wave.basis.period:g} mm: all other effects removed"
     yield Plot(caption, [Dots(phase, rest, "measured"), Dots(phase, finding.shown[own], "model")])
 
 
@@ -336,11 +336,11 @@ def _in_time(diagnosis: Diagnosis, what: str, values: Mapping[str, Array]) -> It
 def _next(diagnosis: Diagnosis) -> ReportSection:
     proposal = diagnosis.proposal
     if proposal is None:
-        return ReportSection("To tell names apart", [])
+        return ReportSection("To distinguish the names", [])
     head = Paragraph(f"{', '.join((proposal.name, *proposal.alternatives))}: {proposal.reason}.")
     if proposal.plan is None:
-        words = "No measurement of this kind within the travels of the machine would tell them apart."
-        return ReportSection("To tell names apart", [head, Paragraph(words)])
+        words = "No measurement of this kind within the travels of the machine distinguishes them."
+        return ReportSection("To distinguish the names", [head, Paragraph(words)])
     names = [name for name in proposal.plan.columns if not name.startswith(("temp_", "time_s"))]
     rows = [[f"{proposal.plan.columns[name][k]:g}" for name in names] for k in range(len(proposal.plan))]
     said = [
@@ -348,13 +348,13 @@ def _next(diagnosis: Diagnosis) -> ReportSection:
         for each in (hope(proposal), unusual(proposal), hopeless(proposal))
         if each
     ]
-    return ReportSection("To tell names apart", [head, *said, Table(names, rows)])
+    return ReportSection("To distinguish the names", [head, *said, Table(names, rows)])
 
 
 def _unseen(diagnosis: Diagnosis) -> ReportSection:
     names = ", ".join(name for name, _ in diagnosis.case.invisible)
     count = int(diagnosis.case.outlying.sum())
-    parts = [Paragraph(f"Not visible with these poses: {names}.")] if names else []
+    parts = [Paragraph(f"These poses cannot show: {names}.")] if names else []
     if count:
-        parts.append(Paragraph(f"{count} rows were put aside as outliers; --json lists them."))
+        parts.append(Paragraph(f"{count} rows were excluded as outliers; --json lists them."))
     return ReportSection("What was not considered", parts)

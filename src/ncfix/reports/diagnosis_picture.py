@@ -47,7 +47,7 @@ def _rungs(axes: Any, diagnosis: Diagnosis) -> None:
     rungs = ladder(diagnosis)
     axes.barh([rung.name for rung in rungs], [rung.left_um for rung in rungs], color=MODEL)
     axes.invert_yaxis()
-    axes.set(xlabel="left below each rung, µm rms", title=diagnosis.data.machine.name)
+    axes.set(xlabel="residual below each rung, µm rms", title=diagnosis.data.machine.name)
 
 
 def _against(axes: Any, curve: MeasuredCurve) -> None:

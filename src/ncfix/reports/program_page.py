@@ -29,13 +29,13 @@ MAX_LINE_CHARACTERS = 160
 NOTES = 100
 """Largest number of remarks that are shown, the first `FIRST` of them unfolded."""
 FIRST = 3
-REFUSED = "motion blocks that stayed as they were although they are not right."
-PASSED = "blocks that may stay as they are, and why."
+REFUSED = "motion blocks that could not be corrected safely; they are unchanged."
+PASSED = "blocks that stay unchanged by a rule, and the rule."
 CHOOSE = "Choose a line to see where its motion ends."
 CURVES = (
-    "What the machine file says. Error of the tool tip: actual minus nominal position in the workpiece frame as one "
-    "axis moves and the others stand in the middle of their travel. Below it the errors of each axis; bands are two "
-    "standard deviations, where the file has them."
+    "The errors in the machine file. Error of the tool tip: actual minus nominal position in the workpiece frame, as "
+    "one axis moves and the others are in the middle of their travel. Below it the errors of each axis; bands are "
+    "two standard deviations, if the file has them."
 )
 HIGH = 0.8
 """Share of a limit from which on it is marked as high."""
@@ -118,7 +118,7 @@ class ProgramPage:
             yield card(f"{report.max_correction_um:.1f} µm", "largest correction of X, Y and Z")
         yield card(
             f"{report.rounding_um:.2f} µm",
-            f"added by the control's digits to the tolerance of {self.options.tolerance_um:g} µm",
+            f"of rounding to the control's digits, besides the tolerance of {self.options.tolerance_um:g} µm",
         )
 
     def _said(self) -> str:
@@ -126,7 +126,7 @@ class ProgramPage:
         report, found = self.report, []
         if len(report.block_delete) > 1:
             found.append(
-                "The program is right in several positions of block delete; the pictures show the first of them."
+                "The program was corrected for several positions of block delete; the pictures show the first of them."
             )
         for message in report.warnings[:NOTES]:
             line = f"line {message.place.line}: " if message.place and message.place.line else ""
@@ -259,9 +259,9 @@ def _flat(spot: ListedPlace) -> dict[str, object]:
 
 def _selection(record: PathRecord, drawn: int, strays: float) -> str:
     if drawn >= record.total:
-        return f"All {record.total} places that were looked at are drawn."
+        return f"All {record.total} examined points of the path are drawn."
     return (
-        f"Drawn are {drawn} of {record.total} places that were looked at: of every stretch of path the largest error "
-        "before and after is kept, and the places that give the path its shape. The lines drawn leave it by at most "
-        f"{strays:.2g} mm."
+        f"{drawn} of {record.total} examined points of the path are drawn: in each stretch those with the largest "
+        "error before and after, and those that define the shape of the path. The drawn lines differ from the path "
+        f"by at most {strays:.2g} mm."
     )

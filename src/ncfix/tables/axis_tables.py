@@ -251,4 +251,6 @@ def reversal_note(machine: Machine, space: Array, tool_length: float, done: Comp
     taken = done.at(machine.axis_names, q, ways) - done.at(machine.axis_names, q, neither)
     left = float(np.linalg.norm((either - mean - taken)[:, linear_axes(machine)], axis=1).max())
     if left > SLIGHT:
-        yield f"What the way changes in which an axis moves (play) is left: up to {1e3 * left:.2f} um."
+        yield (
+            f"Errors that depend on the direction of motion (play) are not corrected: up to {1e3 * left:.2f} um remain."
+        )

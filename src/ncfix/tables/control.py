@@ -157,7 +157,7 @@ class Least:
     @property
     def sentence(self) -> str:
         """The bound as a sentence."""
-        return f"No tables of this kind can leave less than {1e3 * self.value:.2f} um at the worst: {self.why}."
+        return f"With tables of this kind, at least {1e3 * self.value:.2f} um remain at the worst pose: {self.why}."
 
 
 @frozen
@@ -231,8 +231,8 @@ class Control(ABC):
         """Small test files that show on the machine how options must be set; raises `UsageError` NCF485 if there are
         none. Options without a default may be missing in the request; they are then "".
         """
-        text = f"there is nothing to probe for {self.name}"
-        raise UsageError.of("NCF485", text, hint="its assumptions say how to check them")
+        text = f"there is no test on the machine for {self.name}"
+        raise UsageError.of("NCF485", text, hint="the assumptions of the control describe how to check them")
 
     def settings(self, given: Mapping[str, str], complete: bool = True) -> dict[str, str]:
         """All settings, with defaults for those not given.
@@ -248,20 +248,20 @@ class Control(ABC):
             option = self.options.get(key)
             if option is None:
                 known = ", ".join(self.options) or "none"
-                yield Message("NCF485", f"{self.name} has no option {key!r}", hint=f"its options: {known}")
+                yield Message("NCF485", f"{self.name} has no setting {key!r}", hint=f"its settings: {known}")
             elif option.form is not None and option.odd(text):
                 yield Message("NCF485", f"{key}={text}", hint=f"{option.form.hint}{self._how(option)}")
 
     def _missing(self, given: Mapping[str, str]) -> Iterator[Message]:
         for key, option in self.options.items():
             if option.default is None and key not in given:
-                text = f"{self.name} needs the option {key!r}: {option.text}"
+                text = f"{self.name} needs the setting {key!r}: {option.text}"
                 yield Message("NCF485", text, hint=f"--set {key}=VALUE{self._how(option)}")
 
     def _how(self, option: Option) -> str:
         """The end of a hint: how to find the right value of a setting on the machine; "" if not known."""
         found = [each.verify for each in self.assumptions if each.id == option.settled]
-        return f"; on the machine: {found[0]}" if found else ""
+        return f"; find it on the machine: {found[0]}" if found else ""
 
     def described(self) -> dict[str, Any]:
         """Properties and assumptions as plain data."""

@@ -41,8 +41,8 @@ def linear_axes(machine: Machine) -> list[int]:
     if len(found) > 3:
         found = [column for column in found if machine.axis_names[column] in SPATIAL]
     if len(found) != 3:
-        text = "tables need three linear axes, X, Y and Z if there are more, to bring the tip where it should be"
-        raise RefusedError.of("NCF481", text, hint="correct its programs instead: ncfix fix")
+        text = "tables need three linear axes (X, Y and Z if there are more) to move the tip"
+        raise RefusedError.of("NCF481", text, hint="correct the programs instead: ncfix fix")
     return found
 
 
@@ -65,8 +65,8 @@ def exact_correction(machine: Machine, q: Array, state: State, start: Array | No
         if number % ANEW == 0:
             jacobian = machine.axis_jacobian(q + correction, state.tool_length)[..., :3, columns]
         correction[:, columns] += np.linalg.solve(jacobian, gap[..., None])[..., 0]
-    text = "no correction found that brings the tip where it should be"
-    raise RefusedError.of("NCF482", text, hint="the error model may have a jump")
+    text = "no correction found that brings the tip to its nominal position"
+    raise RefusedError.of("NCF482", text, hint="look for a jump in the errors of the machine file")
 
 
 def own_rotary_correction(machine: Machine, q: Array, state: State) -> Array:
@@ -125,9 +125,9 @@ def ranges_of(machine: Machine, given: Ranges | None = None) -> Array:
         index = machine.axis_names.index(name)
         low, high = machine.ranges[index]
         if not limits[0] < limits[1]:
-            raise _wrong_range(f"the range of {name} is empty", "LOW,HIGH, the lower first")
+            raise _wrong_range(f"the range of {name} is empty", "give LOW,HIGH with the lower limit first")
         if limits[0] < low - 1e-9 or limits[1] > high + 1e-9:
-            raise _wrong_range(f"the range of {name} goes beyond its travel", "the machine file has the travel")
+            raise _wrong_range(f"the range of {name} exceeds its travel", "see the travel in the machine file")
         space[index] = limits
     for name, limits in zip(machine.axis_names, space, strict=True):
         if not np.isfinite(limits).all():

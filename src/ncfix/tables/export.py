@@ -110,13 +110,16 @@ def check_origin(manifest: Manifest, control: str, machine: Machine | None, path
     """Refuse tables of another control, or of another machine unless that is None: raises `RefusedError` NCF487."""
     place = Place(path)
     if manifest.control != control:
-        text, hint = f"these are tables for {manifest.control}, not {control}", f"ncfix emulate {manifest.control}"
+        text, hint = (
+            f"these tables are for the control {manifest.control}, not {control}",
+            f"ncfix emulate {manifest.control}",
+        )
         raise RefusedError.of("NCF487", text, place, hint)
     if machine is not None and manifest.hash != machine.hash:
         text = f"these tables were made for another machine, or for other errors of it: {manifest.machine}"
-        hint = "export them again for this machine file, or say --other-machine"
+        hint = "export them again for this machine file, or use --other-machine"
         if machine.inputs:
-            hint = f"give {', '.join(sorted(machine.inputs))} with --input as export had it, or {hint}"
+            hint = f"give {', '.join(sorted(machine.inputs))} with --input as for the export, or {hint}"
         raise RefusedError.of("NCF487", text, place, hint)
 
 
@@ -213,7 +216,9 @@ def emulate(
     Raises `ConfigError` for files that the control would not load, `RefusedError` NCF487 for those of another machine.
     """
     if SIDE_FILE not in files:
-        raise ConfigError.of("NCF486", f"has no {SIDE_FILE}", Place(folder), "give the folder that export wrote")
+        raise ConfigError.of(
+            "NCF486", f"has no {SIDE_FILE}", Place(folder), "give the folder that `ncfix export` wrote"
+        )
     path = f"{folder}/{SIDE_FILE}"
     made = read_manifest(files[SIDE_FILE], path)
     check_origin(made, control.name, None if any_machine else machine, path)
@@ -246,7 +251,7 @@ def _read_again(control: Control, written: Written) -> Tables:
     try:
         return _read(control, written.files)
     except ConfigError as error:
-        hint = "is every error in mm and rad? A smaller range, or ncfix fix, may do"
+        hint = "check that all errors are in mm and rad; try a smaller range, or use ncfix fix"
         texts = (f"{each.place.path}: {each.text}" if each.place else each.text for each in error.messages)
         said = [Message("NCF484", f"the control could not be given these tables: {text}", hint=hint) for text in texts]
         raise RefusedError.collected(said) from error
@@ -264,28 +269,34 @@ def _remarks(control: Control, request: Request, tables: Tables, left: Residual,
         yield written.least.sentence
     before, after = (float(np.sqrt(np.mean(each**2))) for each in (left.before, left.after))
     if after > WORTH * before and before > request.target:
-        yield "These tables take off next to nothing: the format does not reach the errors of this machine."
+        yield "These tables remove almost none of the error: the format cannot hold the errors of this machine."
     machine, counted = request.machine, dict(_wrong_turn(request, tables))
     for axis, (low, high), travel in zip(machine.axes, request.space.tolist(), machine.ranges.tolist(), strict=True):
         if np.isfinite(travel).all() and (low > travel[0] + CLOSE or high < travel[1] - CLOSE):
             sizes = [f"{value / axis.unit:g}" for value in (low, high, *travel)]
             covered = f"{axis.name} from {sizes[0]} to {sizes[1]}, of a travel from {sizes[2]} to {sizes[3]}"
-            yield f"They cover {covered}: beyond that {control.properties.extrapolation}, and more is left."
+            yield (
+                f"The tables cover {covered}. Beyond that: {control.properties.extrapolation}, and the remaining "
+                "error is larger."
+            )
         if axis.endless and high - low < TURN - CLOSE and axis.name not in counted:
             covered = f"{axis.name} from {low / axis.unit:g} to {high / axis.unit:g} degree"
-            yield f"They cover {covered} of a turn: nothing is said of what is left beyond."
+            yield f"The tables cover {covered} of a turn; the remaining error beyond that is not known."
     for name, covered in counted.items():
-        text = f"{name} turns without end and these tables do not repeat: they hold while the control counts it from "
-        text += f"{covered}; elsewhere {control.properties.extrapolation}"
-        yield f"{text}. --range {name}=LOW,HIGH makes them for other counts."
+        text = (
+            f"{name} has no end of travel, and these tables do not repeat: they hold while the control counts it from "
+        )
+        text += f"{covered}. Elsewhere: {control.properties.extrapolation}"
+        yield f"{text}. --range {name}=LOW,HIGH makes them for another range."
     if request.inputs:
         known = ", ".join(f"{name} = {value:g}" for name, value in request.inputs.items())
         again = (
-            f"ncfix emulate --other-machine --input {next(iter(request.inputs))}=VALUE says what they leave elsewhere"
+            f"ncfix emulate --other-machine --input {next(iter(request.inputs))}=VALUE shows the remaining error at "
+            "other values"
         )
-        yield f"They hold for {known}: no table follows it. {again}."
+        yield f"The tables hold for {known}: tables do not follow inputs. {again}."
     if not control.any_tool and not request.tool_length and machine.depends_on_tool_length:
-        yield "They are for a tool of no length: --tool-length was not given, and the error depends on it."
+        yield "The tables are for tool length zero: --tool-length was not given, and the error depends on it."
 
 
 def _wrong_turn(request: Request, tables: Tables) -> Iterator[tuple[str, str]]:
@@ -313,9 +324,11 @@ def _check_size(machine: Machine, left: Residual, target: float) -> None:
             angles = f"{np.degrees(value):.4f} of {np.degrees(limit):.4f} degree"
             shown = angles if rotary else f"{value:.3f} of {limit} mm"
             text = f"the correction of {name} is larger than this machine allows: {shown} at {at}"
-            raise RefusedError.of("NCF489", text, hint="max_correction in the machine file, if that is right")
+            raise RefusedError.of(
+                "NCF489", text, hint="raise max_correction in the machine file, if the correction is right"
+            )
     if np.mean(left.after**2) > np.mean(left.before**2) + (target / 10) ** 2:
         sizes = [f"{1e3 * float(np.sqrt(np.mean(each**2))):.3g}" for each in (left.after, left.before)]
-        text = "these tables would leave more error than there is without them: "
-        hint = "the format does not reach these errors: correct programs, ncfix fix"
+        text = "these tables would increase the error: "
+        hint = "the format cannot hold these errors; correct programs with ncfix fix"
         raise RefusedError.of("NCF490", f"{text}{sizes[0]} um rms instead of {sizes[1]}", hint=hint)

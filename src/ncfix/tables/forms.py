@@ -131,7 +131,7 @@ def read_form(form: FileForm, path: str, content: bytes) -> tuple[TableFile, Rem
     if not lines:
         remarks.refuse(0, "is empty")
     for kind in {*form.needs} - {line.kind for line in lines}:
-        remarks.refuse(0, f"no line of the sort {kind!r}")
+        remarks.refuse(0, f"the file has no line of the kind {kind!r}")
     if not remarks.wrong:
         form.check(document, remarks)
     return document, remarks
@@ -143,8 +143,8 @@ def _line(form: FileForm, remarks: Remarks, number: int, row: str) -> FileLine:
         if match:
             return _slotted(kind, row, match)
     comma = re.search(r"\d,\d", row)
-    hint = "see docs/controllers.md" if BY_NAME.get(form.name) is form else f"a line is one of: {', '.join(form.kinds)}"
-    remarks.refuse(number, "a decimal comma" if comma else f"is no line of {form.title}", hint)
+    hint = "see docs/controllers.md" if BY_NAME.get(form.name) is form else f"possible lines: {', '.join(form.kinds)}"
+    remarks.refuse(number, "a decimal comma" if comma else f"is not a line of {form.title}", hint)
     return FileLine("?", row)
 
 
@@ -175,7 +175,7 @@ def _elmo(document: TableFile, remarks: Remarks) -> None:
     shape = tuple(map(int, sizes[0])) if sizes else ()
     rows = document.rows("row")
     if len(shape) == 2 and (len(rows) != shape[0] or any(len(row) != shape[1] for row in rows)):
-        remarks.refuse(0, f"{len(rows)} rows, and Table dimensions says {shape[0]} of {shape[1]}")
+        remarks.refuse(0, f"{len(rows)} rows, but Table dimensions states {shape[0]} of {shape[1]}")
     declared = document.rows("size")
     if declared and len(shape) == 2 and declared[0][0] != shape[0] * shape[1]:
         remarks.refuse(0, f"Table size {declared[0][0]:g} is not {shape[0]} x {shape[1]}")
@@ -206,7 +206,7 @@ def _united(document: TableFile, remarks: Remarks) -> None:
         remarks.refuse(0, "should begin with the line of the unit")
     for axis, rows in document.sections("axis").items():
         if len(rows) < 2 or any(after[0] <= before[0] for before, after in pairwise(rows)):
-            remarks.refuse(0, f"axis {axis} needs two positions or more, and they must ascend")
+            remarks.refuse(0, f"axis {axis} needs at least two positions, and they must ascend")
 
 
 def _defined(document: TableFile, remarks: Remarks) -> None:
@@ -224,9 +224,9 @@ def _defined(document: TableFile, remarks: Remarks) -> None:
         if said is None:
             continue
         if len(entries) != int(said[1]):
-            remarks.refuse(number, f"{len(entries)} entries follow, and the line says {said[1]}")
+            remarks.refuse(number, f"{len(entries)} entries follow, but the line states {said[1]}")
         elif entries[-1]:
-            remarks.doubt(number, f"the last entry is {entries[-1]}: at zero, where the table begins anew, it is 0")
+            remarks.doubt(number, f"the last entry is {entries[-1]}, but must be 0: there the table starts again")
 
 
 def _headed(document: TableFile, remarks: Remarks) -> None:
@@ -476,5 +476,10 @@ def _of_form(name: str, content: bytes) -> Linted:
     told = [(form, remarks) for form, found, remarks in read if any(line.kind in form.tells for line in found.lines)]
     for form, remarks in (whole or told)[:1]:
         return Linted(form.name, form.title, _from_elsewhere(remarks.messages))
-    hint = "docs/controllers.md, Tables from elsewhere, has the forms; --control NAME says whose a damaged one is"
-    return Linted("", "", (Message("NCF509", "is no table of a form that ncfix or a plugin knows", Place(name), hint),))
+    hint = (
+        "docs/controllers.md, Tables from elsewhere, lists the forms; for a damaged file, name its control with "
+        "--control NAME"
+    )
+    return Linted(
+        "", "", (Message("NCF509", "is not a table in a form that ncfix or a plugin knows", Place(name), hint),)
+    )

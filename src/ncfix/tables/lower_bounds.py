@@ -238,7 +238,7 @@ def least_of_functions(machine: Machine, space: Array, tool_length: float, input
     found = exact_correction(machine, q, State(tool_length, direction))[:, linear_axes(machine)]
     pairs = (np.linalg.norm(each[:, None] - each[None], axis=-1) for each in found.reshape(PLACES, OTHERS, 3))
     value = max(float(distances.max()) / 2 for distances in pairs)
-    return Least(value, f"the correction changes by so much either way where {' '.join(inputs)} stand still")
+    return Least(value, f"the correction varies by plus or minus this at one position of {' '.join(inputs)}")
 
 
 def least_of_own_axis(machine: Machine, space: Array, tool_length: float) -> Least:
@@ -249,7 +249,7 @@ def least_of_own_axis(machine: Machine, space: Array, tool_length: float) -> Lea
         own = _correction(machine, q, tool_length)[:, axis].reshape(PLACES, OTHERS)
         values[machine.axis_names[axis]] = float(np.ptp(own, axis=1).max()) / 2
     name = max(values, key=lambda name: values[name])
-    return Least(values[name], f"the correction of {name} changes by so much either way where {name} stands")
+    return Least(values[name], f"the correction of {name} varies by plus or minus this at one position of {name}")
 
 
 def least_of_sums(machine: Machine, space: Array, tool_length: float) -> Least:
@@ -257,7 +257,9 @@ def least_of_sums(machine: Machine, space: Array, tool_length: float) -> Least:
     lines = [np.linspace(low, high, NODES) for low, high in space.tolist()]
     values = on_full_grid(lambda q: _correction(machine, q, tool_length)[:, linear_axes(machine)], lines)
     left = least_worst(lines, [False] * len(lines), values, 0.0, together=1)
-    return Least(left.bound, "a weighting of the correction that no function of one axis sees has so much of it")
+    return Least(
+        left.bound, "a part of the correction of this size cannot be written as a sum of functions of one axis"
+    )
 
 
 def least_of_even_nodes(volume: Volume, index: int, count: int) -> Least:
@@ -275,7 +277,7 @@ def least_of_even_nodes(volume: Volume, index: int, count: int) -> Least:
     for start in np.unique(starts, axis=0):
         line = volume.exact(poses_along(index, fine, start[None]))
         best = max(best, *(_nearest(fine, curve, nodes) for curve in line.T))
-    return Least(best, f"{count} even points along {volume.inputs[index]} follow its bending no better")
+    return Least(best, f"{count} equidistant points along {volume.inputs[index]} cannot follow the curvature better")
 
 
 def _correction(machine: Machine, q: Array, tool_length: float) -> Array:

@@ -112,8 +112,8 @@ def _trigo(machine: Machine, pivot: int) -> Form:
 def _forward_inverse(machine: Machine, name: str) -> Form:
     sides = [axis.workpiece_side for axis in machine.axes]
     if machine.axis_names != CHAIN or sides != [True, True, True, False, False]:
-        text = f"{name} is for the chain w C A Y F X Z t; this machine is {machine.topology}"
-        raise RefusedError.of("NCF484", text, hint="scheme=auto is for any machine")
+        text = f"{name} needs the topology w C A Y F X Z t; this machine has {machine.topology}"
+        raise RefusedError.of("NCF484", text, hint="scheme=auto works for any machine")
     index = {letter: place for place, letter in enumerate(CHAIN)}
     pivot = index["A"]
 
@@ -144,7 +144,7 @@ def _hundreds(q: Array) -> Array:
 def _rotary(machine: Machine, name: str) -> list[int]:
     found = np.flatnonzero(machine.rotary).tolist()
     if not found:
-        raise RefusedError.of("NCF484", f"{name} needs a rotary axis", hint="scheme=auto is for any machine")
+        raise RefusedError.of("NCF484", f"{name} needs a rotary axis", hint="scheme=auto works for any machine")
     return found
 
 
@@ -155,8 +155,8 @@ def _made(task: SchemeTask, form: Form) -> Scheme:
     tables = Compensation((*done.tables.terms, *moved.tables.terms))
     count = len({id(grid) for grid in tables.grids})
     if count > task.limits.tables:
-        text = f"this scheme takes {count} tables, and the control has {task.limits.tables}"
-        raise RefusedError.of("NCF484", text, hint="scheme=auto makes do with what there is")
+        text = f"this scheme needs {count} tables, but the control has {task.limits.tables}"
+        raise RefusedError.of("NCF484", text, hint="scheme=auto uses only the tables that the control has")
     return Scheme(tables, moved.missed, moved.rest, 0.0)
 
 

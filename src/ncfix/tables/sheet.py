@@ -13,24 +13,25 @@ from ncfix.tables.correction import Residual, corners, residual
 from ncfix.version import __version__
 
 CLASSES = {
-    "L-POS": "how far each linear axis goes, along itself.",
+    "L-POS": "positioning of the linear axes.",
     "L-STR": "straightness of the linear axes.",
     "L-SQR": "squareness of the linear axes.",
-    "L-ANG": "what the angular errors of linear axes do to the tip.",
-    "L-VOL": "the position of the tip over all linear axes together.",
+    "L-ANG": "displacement of the tip by angular errors of the linear axes.",
+    "L-VOL": "position of the tip, over all linear axes together.",
     "L-VOL+": "the same, and the direction of the tool.",
-    "R-RAX": "how far each rotary axis turns, about itself.",
-    "R-VOL": "the position of the tip over linear and rotary axes together.",
+    "R-RAX": "positioning of the rotary axes.",
+    "R-VOL": "position of the tip, over linear and rotary axes together.",
     "R-VOL+": "the same, and the direction of the tool.",
 }
 """Class of ISO/TR 16907 -> the errors that it corrects, in words."""
 BEFORE = (
-    "Save all parameters and compensation data of the control, in a place from which they can be loaded again.",
-    "Leave in force what the control compensated while the machine was measured: these tables come on top of it. Where "
-    "they take the place of values that are there (other than zero), load the sum of both, or do not load them.",
-    "Take the workpiece out, put in no tool or a short one, go to the middle of the travel, turn the overrides down, "
-    "and keep a hand at the emergency stop: if a sign or a unit is wrong, it shows as a jump when the tables come on.",
-    "Before the machine cuts again: measure as in the last step, and run one program above the part.",
+    "Save all parameters and compensation data of the control, so that they can be loaded again.",
+    "Keep every compensation active that was active while the machine was measured: these tables are in addition to "
+    "it. Where they would replace values other than zero, load the sum of both, or do not load them.",
+    "Remove the workpiece, use no tool or a short one, move to the middle of the travel, turn the overrides down, "
+    "and keep a hand at the emergency stop: if a sign or a unit is wrong, the axes jump when the tables become "
+    "active.",
+    "Before the machine cuts again, measure as in the last step, and run one program above the part.",
 )
 """Steps before loading tables, the same for every control."""
 JUMP = 1.5
@@ -59,9 +60,12 @@ def _lines(control: Control, request: Request, tables: Tables, left: Residual, w
     words = reached.replace(",", " ").split()
     yield from (f"- {name}: {meaning}" for name, meaning in CLASSES.items() if name in words)
     if control.any_tool:
-        yield f"- They hold for tools of any length; the figures are those of {request.tool_length:g} mm."
+        yield f"- The tables hold for tools of any length; the figures are for {request.tool_length:g} mm."
     else:
-        yield f"- They hold for a tool of {request.tool_length:g} mm, gauge line to tip{_length_note(request, tables)}."
+        yield (
+            f"- The tables hold for a tool of {request.tool_length:g} mm, gauge line to "
+            f"tip{_length_note(request, tables)}."
+        )
     yield f"- Positions count from: {control.properties.position_frame}; looked up: {control.properties.input_signal}."
     if not control.rewrites:
         yield "- Programs that ncfix fix has corrected must not run with them: they would be corrected twice."
@@ -76,17 +80,20 @@ def _lines(control: Control, request: Request, tables: Tables, left: Residual, w
     yield from _list("Settings", (f"{name} = {value}" for name, value in request.settings.items() if value))
     if not control.rewrites:
         moved = ", ".join(f"{name} {_moved(JUMP * value, rotary)}" for name, value, rotary in largest if value)
-        jump = f"No axis may move by more than this when the tables come on: {moved}."
+        jump = f"No axis may move by more than this when the tables become active: {moved}."
         yield from _list("Before you begin", (*BEFORE, jump) if moved else BEFORE)
     yield from _list("What to do, in this order", control.steps, numbered=True)
     if not control.rewrites:
-        title = "What the control must add then (mean of both ways); see that nothing is in the way of the axes"
+        title = (
+            "What the control must then add (mean of both directions of motion); make sure that the axes are free to "
+            "move"
+        )
         yield from _list(title, _checks(request, tables))
-    yield from _list("How to switch it off", [control.switch_off])
+    yield from _list("How to switch the tables off", [control.switch_off])
     yield from _list("Files", sorted(written.files))
     yield from _list("Remarks", written.notes)
     assumed = [f"{each.id}: {each.text} Check: {each.verify} Source: {each.source}." for each in control.assumptions]
-    yield from _list("Assumed, since no public text settles it", assumed)
+    yield from _list("Assumed, because no public document states it", assumed)
 
 
 def _list(title: str, items: Iterable[str], numbered: bool = False) -> Iterator[str]:
@@ -100,7 +107,7 @@ def _length_note(request: Request, tables: Tables) -> str:
     if request.machine.depends_on_tool_length:
         other = residual(request.machine, tables, request.space, request.tool_length + LONGER).figures()["after"]
         left = f"max {other['max']:.2f} um, rms {other['rms']:.2f} um"
-        return f"; the error depends on that length: with a tool {LONGER:g} mm longer {left} are left"
+        return f"; the error depends on that length: with a tool {LONGER:g} mm longer, {left} remain"
     return "; the error of this machine does not depend on that length"
 
 

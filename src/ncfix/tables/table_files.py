@@ -64,14 +64,14 @@ class Remarks:
         text = content.decode("latin-1")
         remarks = cls(path, _rows(text.removeprefix(BYTE_ORDER)), open_end=not text.endswith(("\n", "\r")))
         if text.startswith(BYTE_ORDER):
-            remarks.doubt(1, "begins with a byte order mark", "controls read plain ASCII")
+            remarks.doubt(1, "begins with a byte order mark", "controls read plain ASCII only")
         if ALONE.search(text):
             remarks.doubt(0, "a line ends in CR alone", "LF or CR LF")
         for number, row in enumerate(remarks.rows, 1):
             if not row.isascii():
                 inside = comment and re.split(comment, row, maxsplit=1)[0].isascii()
                 note = remarks.doubt if inside else remarks.refuse
-                note(number, "a character that is not ASCII", "controls read plain ASCII")
+                note(number, "a character that is not ASCII", "controls read plain ASCII only")
                 break
         return remarks
 
@@ -86,7 +86,7 @@ class Remarks:
     def doubt_end(self) -> None:
         """Note a missing line end, for a format without an end mark: the last number may lack digits."""
         if self.open_end and self.rows:
-            self.doubt(len(self.rows), "the last line does not end: was the file cut off?", "a line end behind it")
+            self.doubt(len(self.rows), "the last line does not end: was the file cut off?", "add a line end")
 
     def check(self) -> None:
         """Raise `ConfigError` with all of `wrong`, if there are any."""
@@ -133,6 +133,6 @@ def in_order(machine: Machine, known: Sequence[str] = ORDER) -> tuple[str, ...]:
     if odd:
         lengths = " ".join(letter for letter in known if letter not in TURNING)
         text = f"axes {' '.join(odd)}: linear axes are {lengths} here, rotary axes {' '.join(TURNING)}"
-        hint = "name them so in the machine file, or correct its programs: ncfix fix"
+        hint = "name the axes like this in the machine file, or correct the programs: ncfix fix"
         raise RefusedError.of("NCF484", text, hint=hint)
     return tuple(letter for letter in known if letter in machine.axis_names)

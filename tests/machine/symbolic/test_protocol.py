@@ -59,8 +59,8 @@ def test_combinations_are_what_the_formulas_have(trunnion: Derivation) -> None:
 def test_text_says_what_is_inseparable_and_what_is_invisible(trunnion: Derivation) -> None:
     text = identifiable(trunnion).to_text()
     assert text.startswith("rank 17 of 36\n")
-    assert "only together: EC0C + EC0Y\n" in text
-    assert "no pose shows:" in text
+    assert "only in combination: EC0C + EC0Y\n" in text
+    assert "visible at no pose:" in text
     assert "EZ0C" in text
 
 

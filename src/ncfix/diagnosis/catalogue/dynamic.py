@@ -127,7 +127,7 @@ def _spikes(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
         effects.append(Effect(name, (), Polynomial(degree=(1,)), input=f"{word}_{low}"))
         effects.append(Effect(name, (), Polynomial(degree=(1,)), input=f"{word}_{low}", **measured.factor(axis)))
     loadings = tuple(np.eye(4)[:, 2 * k : 2 * k + 2] * [1.0, GROWING] for k in range(len(FADING_S)))
-    title = f"reversal spikes of {axis.name}: it sticks for a moment where it turns round"
+    title = f"reversal spikes of {axis.name}: it sticks for a moment where it reverses"
     remedy = "adjust the friction compensation (quadrant) of the drive; lubricate"
     needs = tuple(f"{word}_{low}" for word in FADING_S)
     yield Candidate(
@@ -148,11 +148,11 @@ def _pair(first: Axis, second: Axis) -> Iterator[Candidate]:
     sense = [float(np.asarray(a.error_axes[along(a) or 0]) @ np.asarray(a.direction)) for a in (first, second)]
     for kind, word, size, signs, title, remedy in (
         ("servo mismatch", "speed", SPEED, (1.0, -1.0), "one lags more than the other: circles are oval at 45 degrees, "
-         "the other way round the other way", "make the gains of both position loops alike"),
-        ("lag", "accel", ACCELERATION, (1.0, 1.0), "both lag alike: circles are smaller the faster they are run",
-         "more gain or feedforward in both position loops"),
+         "in the opposite sense of travel at -45 degrees", "make the gains of both position loops alike"),
+        ("lag", "accel", ACCELERATION, (1.0, 1.0), "both lag equally: circles become smaller with the feed",
+         "raise gain or feedforward in both position loops"),
         ("master-slave changeover", "slave", SPEED, (1.0, 1.0), "the slower axis lags more: steps at 45 degrees, where "
-         "the other one becomes the slower", "a control that leads both axes alike"),
+         "the other one becomes the slower", "use a control that leads both axes equally"),
     ):  # fmt: skip
         low = first.name.lower(), second.name.lower()
         needs = (f"{word}_{low[0]}_{low[1]}", f"{word}_{low[1]}_{low[0]}")

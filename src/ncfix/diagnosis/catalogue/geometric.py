@@ -145,7 +145,7 @@ def rotary_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
 def _motions(axis: Axis, own: int) -> Iterator[Candidate]:
     """Radial, axial, wobble and encoder errors of a rotary axis, each of all orders."""
     q, first, second = axis.name, *across(axis)
-    bearing = "check the bearing and how its rings are seated"
+    bearing = "check the bearing and the seat of its rings"
     sorts = (
         (f"radial {q}", f"radial error motion of {q}: eccentric, oval", (LETTERS[first], LETTERS[second]), bearing),
         (f"axial {q}", f"axial error motion of {q}: face run-out", (LETTERS[own],), bearing),
@@ -169,7 +169,7 @@ def _worm(axis: Axis, own: int) -> Candidate:
     effect = zero([Effect(f"E{TURNS[own]}{axis.name}", (), Fourier(order=TEETH))])
     columns = np.eye(2 * len(TEETH))
     loadings: tuple[Array, ...] = tuple(columns[:, 2 * k : 2 * k + 2] for k in range(len(TEETH)))
-    title = f"worm or gear of {axis.name}: several waves a turn"
+    title = f"worm or gear of {axis.name}: several waves per turn"
     return Candidate(
         f"worm {axis.name}", title, axis.name, f"{axis.name} turning", effect, loadings, (), "check the worm"
     )
@@ -196,7 +196,7 @@ def _seat(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
     every = [slice(each * k, each * (k + 1)) for k in range(len(measured.linear))]
     single = [slice(2 * k, 2 * k + 2) for k in range(len(places))]
     loadings = tuple(columns[:, part] for part in (*every, *single))
-    title = f"rotary seat of {axis.name}: an error of its turn that grows with a linear position"
+    title = f"rotary seat of {axis.name}: an angular positioning error that grows with a linear position"
     name = f"rotary seat {axis.name}"
     yield Candidate(name, title, axis.name, f"{axis.name} turning", effects, loadings, (), "check the seat")
 
@@ -212,7 +212,7 @@ def location_candidates(measured: MeasuredRange) -> Iterator[Candidate]:
         for name in _lines(measured, axis):
             if name not in known:
                 title = component_title(name, axis)
-                remedy = "re-measure where the axis lies"
+                remedy = "measure the location of the axis again"
                 effect = zero([Effect(name, ())])
                 family, first = f"{axis.name} location", not _located(measured, axis)
                 yield Candidate(name, title, axis.name, family, effect, ONE, (), remedy, constant=first)

@@ -248,9 +248,9 @@ def _slip(measured: MeasuredRange) -> Iterator[Candidate]:
         whole = np.zeros((SLIPS * 6, 3))
         whole[6 * k : 6 * k + 6] = after
         loadings.append(whole)
-    title = "slip: something slipped, was re-zeroed or hit once; before and after differ"
+    title = "slip: something slipped, was set to zero again or was hit; before and after differ"
     yield Candidate(
-        "slip", title, "", "slip", zero(effects), tuple(loadings), ("time_s",), "find out what happened then"
+        "slip", title, "", "slip", zero(effects), tuple(loadings), ("time_s",), "find out what happened at that time"
     )
 
 
@@ -259,5 +259,5 @@ def _artefact(measured: MeasuredRange, clocked: bool) -> Candidate:
     drive = _drive(measured, dict.fromkeys(measured.sensors, 1.0), PLATE, clocked)
     effects = zero([Effect(f"EX{SPINDLE}", (), **each) for each in drive.options])
     title = "artefact growth: the artefact or workpiece expands with temperature"
-    remedy, needs = "log the artefact's own temperature", measured.sensors
+    remedy, needs = "record the temperature of the artefact", measured.sensors
     return Candidate("artefact growth", title, "", "heat", effects, drive.forms[:1], needs, remedy, True)

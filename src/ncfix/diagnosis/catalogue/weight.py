@@ -67,7 +67,9 @@ def _beam(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
     ]
     if not axis.workpiece_side:
         ends = (FREE_END, MIRROR @ FREE_END)
-        sorts.append(("ram droop", f"ram droop: {q} hangs the further it is out", ends, "a counterweight, or tables"))
+        sorts.append(
+            ("ram droop", f"ram droop: {q} sags more the further it is out", ends, "a counterweight, or tables")
+        )
     own = along(axis)
     if own is None:
         return
@@ -178,10 +180,10 @@ def _table(axis: Axis) -> Candidate:
     effects = zero([Effect(f"E{TURNS[k]}{axis.name}", (), Fourier(order=(2,))) for k in (first, second)])
     turning = np.array([[1, 0], [0, 1], [0, -1], [1, 0]], dtype=np.float64)
     back = np.array([[1, 0], [0, 1], [0, 1], [-1, 0]], dtype=np.float64)
-    title = f"table of {axis.name} is softer one way: table stiffness differs, twice a turn"
+    title = f"table of {axis.name} is less stiff in one direction: deflection twice a turn"
     return Candidate(
         f"table stiffness {axis.name}", title, axis.name, f"{axis.name} turning", effects, (turning, back), (),
-        "place the load in the middle",
+        "put the load in the middle of the table",
     )  # fmt: skip
 
 
@@ -227,7 +229,7 @@ def _sag(measured: MeasuredRange, axis: Axis) -> Candidate:
         columns = np.diag(size.ravel())
         loadings.append(columns[:, columns.any(axis=0)])
         at += len(form)
-    title = f"gravity sag of {axis.name}: its body hangs, as sine and cosine of the angle, with the load"
+    title = f"gravity sag of {axis.name}: its body sags as sine and cosine of the angle, in proportion to the load"
     return Candidate(
         f"gravity sag {axis.name}", title, axis.name, f"{axis.name} weight", effects, tuple(loadings),
         ("load_kg",) if len(loaded) == 2 else (), "",
@@ -276,5 +278,5 @@ def _droop(measured: MeasuredRange) -> Iterator[Candidate]:
     wave = Fourier(order=(1,))
     effects = zero([Effect(n, (), wave, input=head.name, **long) for head in heads for n in names])
     loading = weighed((1.0,) * 2 * len(effects))
-    title = "tool droop: tool and holder hang by their weight as the head turns"
-    yield Candidate("tool droop", title, "", "spindle", effects, (loading,), ("tool_length",), "a stiffer holder")
+    title = "tool droop: tool and holder sag by their weight as the head turns"
+    yield Candidate("tool droop", title, "", "spindle", effects, (loading,), ("tool_length",), "use a stiffer holder")

@@ -142,7 +142,7 @@ def _one_sided(
                 )
                 for each, of, part in zip(measurements, seen, parts, strict=True)
             )
-            title = f"table already active for {axis.name}, but only where it moves in {said}"
+            title = f"table already active for {axis.name}, but only where it moves towards {said}"
             yield rest.left(rest.y + column), Mistake(f"table active {axis.name}", title, axis.name, machine, changed)
 
 
@@ -273,11 +273,11 @@ def not_of_first_order(measurements: tuple[Measurement, ...], machine: Machine, 
     yield from _exchanged_axes(measurements, machine)
     for axis in machine.axes:
         if axis.rotary:
-            title = f"rotary sign: the machine file turns {axis.name} the other way round"
+            title = f"rotary sign: the machine file turns {axis.name} in the opposite sense"
             turned = _with(machine, replace(axis, direction=tuple(-x for x in axis.direction)))  # type: ignore[arg-type]
             yield Mistake(f"rotary sign {axis.name}", title, axis.name, turned, measurements)
         else:
-            title = f"axis sign: the positions of {axis.name} count the other way"
+            title = f"axis sign: the positions of {axis.name} count in the opposite direction"
             for right in perhaps_right(measurements):
                 changed = tuple(each.times([axis.name], -1.0, right) for each in measurements)
                 yield Mistake(f"axis sign {axis.name}", title, axis.name, machine, changed)
@@ -397,12 +397,12 @@ def _pivot(measurements: tuple[Measurement, ...], machine: Machine, axis: Axis) 
     far, large = float(np.linalg.norm(off)), much(machine, f"EX0{axis.name}")
     if far < DOUBTED * large:
         return None
-    title = f"{PIVOT}: the point of {axis.name} is {far:.2f} mm off in the machine file"
+    title = f"{PIVOT}: the point of {axis.name} in the machine file is wrong by {far:.2f} mm"
     carriers: tuple[str, ...] = ()
     if far < OFF * large and all(each.kind == "probe" for each in measurements):
         title += (
-            "; if the control has the same point as the file, the axis itself has moved (calibrate): measurements "
-            "of kind tcp under tool-centre-point control tell"
+            "; if the control has the same point as the file, the axis itself has moved (calibrate); measurements of "
+            "kind tcp under tool-centre-point control show which"
         )
         along = np.abs(np.asarray(axis.error_axes) @ off)
         carriers = tuple(
@@ -414,7 +414,7 @@ def _pivot(measurements: tuple[Measurement, ...], machine: Machine, axis: Axis) 
 def _other_machine(measurements: tuple[Measurement, ...], machine: Machine, now: Misfit) -> Iterator[Mistake]:
     """The mistake of a file of another machine with the same axes: no curve holds, and its constants are refitted."""
     for fitted, count, gained in without_foreign_tables(measurements, machine, now):
-        title = "another machine: nothing of the file's tables holds; it is another machine's file, or out of date"
+        title = "another machine: no error of the file agrees; the file belongs to another machine or is out of date"
         yield Mistake("another machine", title, "", fitted, measurements, fitted=count, replaces=True, gained=gained)
 
 

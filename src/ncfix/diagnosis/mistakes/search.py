@@ -51,7 +51,7 @@ PLAUSIBLE_UM, DECADE = 3.0, float(np.log(10.0))
 TYPED = 5.0
 """Prior log odds for a mistake that the file itself suggests (`Mistake.likely`)."""
 TINY_UM = 1e-6
-TORN = "the machine file is wrong, or the readings are: no file is written until it is known which"
+TORN = "either the machine file or the readings are wrong; no file is written until it is known which"
 ALIAS_LOG_ODDS = 3.0
 """Log odds (20 to 1) within which another mistake explains the data as well."""
 FIRST_SIGHT = 5.0

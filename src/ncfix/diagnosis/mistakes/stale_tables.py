@@ -17,7 +17,7 @@ SHIFT_REACH = 0.16
 """Largest shift of a table, as a share of the measured travel."""
 SHIFTS = 33
 """Number of shifts that are tried between minus and plus that; the middle one is zero."""
-OF_FILE = "stale table: the curves of the file belong some way beside: "
+OF_FILE = "stale table: the curves of the file are displaced by "
 OF_CONTROL = "stale table: the control corrects with a table shifted by "
 SHIFT_ROUNDS = 4
 """Rounds in which the shift of each axis is optimized given those of the others."""

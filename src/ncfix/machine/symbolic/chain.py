@@ -65,7 +65,10 @@ class Variable:
 
     def __post_init__(self) -> None:
         if self.name in RESERVED or not all(name.isidentifier() for name in (self.name, *self.arguments)):
-            hint = "letters, digits and underscores; no word that Python reserves, no name of a result such as x or dx"
+            hint = (
+                "use letters, digits and underscores; Python keywords and names of results such as x or dx are not "
+                "possible"
+            )
             raise ConfigError.of("NCF391", f"{self.name!r} cannot be the name of a variable", hint=hint)
 
     @property

@@ -57,7 +57,7 @@ def loads_chain(text: str, path: str = "<chain>") -> Chain:
 def _chain(root: TomlTable) -> Chain:
     version = root.integer("ncfix-chain", required=True)
     if version not in (None, SCHEMA):
-        root.note("NCF317", "ncfix-chain", f"schema version {version}, this ncfix reads {SCHEMA}")
+        root.note("NCF317", "ncfix-chain", f"version {version} of the chain file; this ncfix reads version {SCHEMA}")
     name = root.text("name") or "chain"
     tables = root.table("variable", required=True)
     found = [_variable(tables, name) for name in tables.values] if tables else []
@@ -155,7 +155,7 @@ class _Formulas:
             return sp.Rational(str(node.value))
         if isinstance(node, ast.Name):
             if node.id not in self._names:
-                raise _FormulaError(f"no variable {node.id!r}", did_you_mean(node.id, self._names))
+                raise _FormulaError(f"there is no variable {node.id!r}", did_you_mean(node.id, self._names))
             return self._names[node.id]
         if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
             return OPERATORS[type(node.op)](self._value(node.operand))
@@ -165,5 +165,5 @@ class _Formulas:
             function = FUNCTIONS.get(ast.unparse(node.func))
             if function:
                 return function(self._value(node.args[0]))
-        text = f"{ast.unparse(node)!r} cannot be part of a formula"
-        raise _FormulaError(text, "numbers, names, + - * / **, sin, cos, tan, sqrt")
+        text = f"{ast.unparse(node)!r} is not allowed in a formula"
+        raise _FormulaError(text, "a formula has numbers, names, + - * / **, sin, cos, tan, sqrt")

@@ -212,7 +212,7 @@ def derive(
     else:
         chain = source if include is None else _only(source, [include] if isinstance(include, str) else list(include))
     if order < 1:
-        raise UsageError.of("NCF392", f"the order is {order}", hint="1 is first order, 2 second order")
+        raise UsageError.of("NCF392", f"the order is {order}", hint="give 1 for first order, 2 for second order")
     expansion = Expansion(tuple(variable.symbol for variable in chain.smalls), order, linear_trig)
     factors = [factor for step in chain.steps for factor in expansion.step(step)]
     entries = [entry for factor in factors for matrix in factor.values() for entry in matrix]
@@ -226,5 +226,5 @@ def _only(chain: Chain, patterns: list[str]) -> Chain:
     names = [variable.name for variable in chain.smalls]
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in names):
-            raise UsageError.of("NCF393", f"{pattern!r} names no error of this chain", hint=" ".join(names))
+            raise UsageError.of("NCF393", f"{pattern!r} matches no error of this chain", hint=" ".join(names))
     return chain.without(name for name in names if not any(fnmatchcase(name, pattern) for pattern in patterns))

@@ -154,7 +154,7 @@ def chosen(machine: Machine, include: str | Iterable[str] = DEFAULT) -> list[Err
             hint = (
                 f"{f'did you mean {close[0]}? ' if close else ''}{', '.join(GROUPS)}, a name or a pattern such as E?C"
             )
-            raise UsageError.of("NCF393", f"{item!r} names no error of this machine", hint=hint)
+            raise UsageError.of("NCF393", f"{item!r} matches no error of this machine", hint=hint)
         wanted |= found
     return [_symbol(machine, name) for name in everything if name in wanted]
 
@@ -173,8 +173,11 @@ def _symbol(machine: Machine, name: str) -> ErrorSymbol:
     effect = same[0]
     references = [each.reference if effect.rotational else None for each in same]  # only a rotation needs one
     if len({*zip(references, (each.carried for each in same), strict=True)}) > 1:
-        text = f"the effects {name} of this machine differ in reference or carried: one symbol cannot stand for them"
-        raise UsageError.of("NCF393", text, hint="leave it out, or give them one reference point")
+        text = (
+            f"the effects {name} of this machine differ in `reference` or `carried`, so that one symbol cannot "
+            "represent them"
+        )
+        raise UsageError.of("NCF393", text, hint="leave it out, or give the effects the same reference point")
     own = () if effect.location or effect.joint == SPINDLE else (effect.joint,)
     named = (signal for each in same for signal in (each.signal, each.times) if signal is not None)
     signals = (name for signal in named for name in signal.split(SUM))

@@ -151,8 +151,8 @@ class Identifiable:
     def to_text(self) -> str:
         """The result as text."""
         lines = [f"rank {self.rank} of {len(self.unknowns)}"]
-        lines += [f"only together: {combination}" for combination in self.inseparable]
-        lines += [f"no pose shows: {' '.join(self.invisible)}"] if self.invisible else []
+        lines += [f"only in combination: {combination}" for combination in self.inseparable]
+        lines += [f"visible at no pose: {' '.join(self.invisible)}"] if self.invisible else []
         return "\n".join(lines) + "\n"
 
 
@@ -369,13 +369,13 @@ def measuring(derivation: Derivation, vary: Iterable[str] = ()) -> str:
     chain = derivation.chain
     axes = [axis.name for axis in chain.axes]
     parts = [
-        f"{chain.name}: what the position of the tool tip tells\n",
+        f"{chain.name}: what measured positions of the tool tip determine\n",
         f"\nwith {', '.join(axes)} varied: {identifiable(derivation).to_text()}",
     ]
     for name in vary:
         if any(dimension.name == name for dimension in chain.dimensions):
             parts.append(f"\nwith {name} varied, too: {identifiable(derivation, [*axes, name]).to_text()}")
     if rotary := [axis.name for axis in chain.axes if axis.rotary]:
-        parts.append(f"\nDifferences of readings at ({', '.join(rotary)}), degrees, everything else standing still\n")
+        parts.append(f"\nDifferences of readings at ({', '.join(rotary)}), degrees, with all other axes at rest\n")
         parts.append(report(protocol(equations(derivation, signs=(-1,)))))
     return "".join(parts)
