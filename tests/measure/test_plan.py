@@ -111,15 +111,15 @@ def test_two_effects_of_one_component_are_told_apart_by_their_names():
     found = plan(known, "tcp", 20, ROOM, "EXX,backlash-X,screw-X", ["backlash-X", "screw-X"])
     sides = found.plan.columns["dir_X"]
     assert abs(sides.sum()) <= 4
-    with pytest.raises(UsageError, match="wind-up-X is none of the effects"):
+    with pytest.raises(UsageError, match="wind-up-X is not among the effects"):
         plan(known, "tcp", 20, ROOM, "EXX", ["wind-up-X"])
 
 
 def test_what_cannot_be_planned_is_refused_in_words():
     known = machine("three_axis").replace(effects=())
-    with pytest.raises(UsageError, match="EZS follows temp_spindle after a time"):
+    with pytest.raises(UsageError, match="EZS follows temp_spindle with a time constant"):
         plan(known, "tcp", 20, ROOM, "spindle-growth-late")
-    with pytest.raises(UsageError, match="depends on load_kg, and a plan cannot know") as caught:
+    with pytest.raises(UsageError, match="the effects depend on load_kg, whose values") as caught:
         plan(known, "tcp", 20, ROOM, "load-X")
     assert "--input load_kg=LOW,HIGH" in str(caught.value.messages[0].hint)
     with pytest.raises(UsageError, match="no plans of kind 'points'"):
@@ -133,7 +133,7 @@ def test_inputs_that_can_be_set_are_planned():
     load = found.plan.columns["load_kg"]
     assert load.min() < 30
     assert load.max() > 270
-    with pytest.raises(UsageError, match="do not say load_kg"):
+    with pytest.raises(UsageError, match="has no column load_kg"):
         plan(known, "tcp", 30, room, "EXX,load-X", existing=_random(known, 30, 1))
 
 

@@ -473,9 +473,9 @@ def test_deviations_in_millimetres_are_remarked():
         ("X EXX [um]\n0 0\n100 10\n", "'\\[um\\]' is not an error of X"),
         ("X Y EXX\n0 0 0\n", "a grid over several axes"),
         ("X;EXX\n0;0\n100;0,01\n", "3 cells, but 2 columns(.|\n)*decimal point"),
-        ("[EXX]\nGridpoints = {\n 0 0\n 50 5 1\n 100 10\n}\n", "4:1: NCF618: not understood"),
-        ("[EXX]\nUNIT = um\nGridpoints = {\n 0 0\n 100 10\n}\n", "2:1: NCF618: not understood"),
-        ("[C0B\nVALUE = 1e-5\n[EXX]\nGridpoints = {\n 0 0\n}\n", "1:1: NCF618: not understood"),
+        ("[EXX]\nGridpoints = {\n 0 0\n 50 5 1\n 100 10\n}\n", "4:1: NCF618: invalid line"),
+        ("[EXX]\nUNIT = um\nGridpoints = {\n 0 0\n 100 10\n}\n", "2:1: NCF618: invalid line"),
+        ("[C0B\nVALUE = 1e-5\n[EXX]\nGridpoints = {\n 0 0\n}\n", "1:1: NCF618: invalid line"),
     ],
 )
 def test_tables_of_controls_that_would_be_misread(text: str, said: str):

@@ -107,7 +107,7 @@ def test_without_the_second_lattice_it_is_said_that_more_is_left() -> None:
 
 
 BROKEN_TABLES: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
-    "another sign": (lambda found: found.update(sign="error"), "another one than that of rotary.json"),
+    "another sign": (lambda found: found.update(sign="error"), "differs from that of rotary.json"),
     "no centre": (lambda found: found.update(centre_mm=[0, 0]), "not 3 numbers"),
     "a linear axis": (lambda found: found.update(axes=["A", "X"]), "the axes are ['A', 'X']"),
     "no interval": (lambda found: found.update(interval_deg=[0]), "interval_deg is 0, not a number"),
