@@ -86,7 +86,7 @@ IMPOSSIBLE = {
     "a step of a millimetre": ("least_increment = { linear = 1.0 }" + FIVE, "NCF322", "least_increment"),
     "a limit in um": ("max_correction = { linear = 500.0 }" + FIVE, "NCF322", "max_correction"),
     "a point in um": (changed("[0, 0, 120]", "[0, 0, 420000]"), "NCF322", "point"),
-    "table in metres": (FIVE + table("EXX", [0, 0.25, 0.5], [0, 0.002, 0.004]), "NCF323", "speck"),
+    "table in metres": (FIVE + table("EXX", [0, 0.25, 0.5], [0, 0.002, 0.004]), "NCF323", "almost nothing"),
     "table in radians": (FIVE + table("ECC", QUARTERS, [0, 1e-5, 2e-5, 1e-5, 0]), "NCF323", "radians"),
     "table in inches": (FIVE + table("EXX", [0, 9.84, 19.68], [0, 0.002, 0.004]), "NCF323", "positions in inches?"),
     "a travel in inches": (
@@ -102,7 +102,7 @@ def test_a_machine_whose_travels_may_be_in_inches_is_remarked_on() -> None:
     small = changed("[0, 500]", "[0, 20]").replace("[0, 400]", "[0, 16]").replace("[-300, 0]", "[-12, 0]")
     (found,) = doubts(loads(small), "m.toml")
     assert (found.message.code, found.impossible) == ("NCF322", False)
-    assert found.message.hint == "is it given in inches? That would be 508 mm"
+    assert found.message.hint == "`range` is in mm; is it given in inches? That would be 508 mm"
 
 
 def test_a_machine_that_is_left_handed_is_remarked_on() -> None:
