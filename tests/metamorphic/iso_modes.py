@@ -74,7 +74,8 @@ class IsoModes(Author):
             return f"{letter}[{number(value - 3.0, 6)}+3.]"
         if self.dialect != "iso" and self.often(0.1):
             name = f"#{100 + 'XYZABCR'.index(letter)}"
-            self.put(f"{name}={text}")
+            asked = "IF[2GT1]THEN " if self.dialect in MACRO and self.often(0.3) else ""
+            self.put(f"{asked}{name}={text}")
             return letter + name
         return letter + text
 
@@ -87,12 +88,26 @@ class IsoModes(Author):
             self.fed = feed
         if self.often(0.3):
             self.style.shuffle(words)
-        parts = [*([] if code == self.code and self.often(0.6) else [f"G{code}"]), *words, *([feed] if feed else [])]
+        words += self.vacant(words)
+        head = self.computed(code)
+        parts = [*([] if code == self.code and self.often(0.6) else [head]), *words, *([feed] if feed else [])]
         if self.often(0.1):
             self.style.shuffle(parts)
         self.code = code
         self.put(self.prefix + (" " if not self.often(0.1) else "").join(parts), moves=True)
         self.prefix = ""
+
+    def vacant(self, words: list[str]) -> list[str]:
+        """A word that counts as not written, because its variable has no value."""
+        left = [letter for letter in "XYZ" if not any(letter in word for word in words)]
+        return [f"{left[0]}#0"] if self.dialect in MACRO and left and self.often(0.1) else []
+
+    def computed(self, code: str) -> str:
+        """A motion code, sometimes from a variable."""
+        if self.dialect == "iso" or not self.often(0.05):
+            return f"G{code}"
+        self.put(f"#110={code}")
+        return "G#110"
 
     rate = 1.0
 
@@ -197,7 +212,10 @@ class IsoModes(Author):
                 self.extended = self.often(0.5)
                 self.set_extended()
             extended = f"G{154 if self.dialect == 'haas' else 54.1} P{EXTENDED}"
-            self.mode((extended if self.extended else "G55") if self.second else "G54")
+            if self.second and self.extended and self.dialect != "haas" and self.often(0.3):
+                self.alone(f"G54 P{EXTENDED}")
+            else:
+                self.mode((extended if self.extended else "G55") if self.second else "G54")
             self.unsaid = set(self.letters)
             if self.stated and self.dialect in ("iso", "mitsubishi"):
                 self.state_local()
@@ -240,28 +258,44 @@ class IsoModes(Author):
 
     def reflect(self, chance: random.Random) -> None:
         """A mirror image, off or on."""
-        if self.dialect not in ("fanuc", "mitsubishi") or self.steps or self.tcp:
+        if self.dialect not in MACRO or self.steps or self.tcp:
             return
         if (self.rotation.turn - np.eye(3)).any():
             return
+        haas = self.dialect == "haas"
         if (self.mirror.turn - np.eye(3)).any():
             self.mirror = Frame()
-            self.alone("G50.1 X0. Y0.")
+            self.alone("G100 X0. Y0." if haas else "G50.1 X0. Y0.")
         else:
-            n, at = chance.randrange(2), round(chance.uniform(-10, 10), 2)
+            n, at = chance.randrange(2), 0.0 if haas else round(chance.uniform(-10, 10), 2)
             factors, by = [1.0, 1.0, 1.0], [0.0, 0.0, 0.0]
             factors[n], by[n] = -1.0, 2 * at
             self.mirror = shifted(*by) @ scaled(*factors)
-            self.alone(f"G51.1 {'XY'[n]}{number(at / self.unit, 6)}")
+            self.alone(f"{'G101' if haas else 'G51.1'} {'XY'[n]}{number(at / self.unit, 6)}")
         self.compose()
 
     def lengths(self, chance: random.Random) -> None:
         """A length offset, on or off."""
         if self.tcp or self.steps:
             return
-        self.length = 0.0 if self.length else LENGTHS[self.tool]
-        self.mode("G49" if not self.length else f"G43 H{self.tool}")
+        on = not self.length
+        self.length = LENGTHS[self.tool] if on else 0.0
+        if on and self.dialect in MACRO and self.often(0.3):
+            self.mode(f"G43 H{self.measured()}")
+        elif not on and self.dialect in MACRO and self.often(0.3):
+            self.mode("H0")
+        else:
+            self.mode(f"G43 H{self.tool}" if on else "G49")
         self.unsaid |= set("Z")
+
+    def measured(self) -> int:
+        """A register into which the program puts the length of the tool."""
+        register, length = 10 + self.tool, number(self.length / self.unit, 6)
+        if self.steps or self.often(0.5):
+            self.alone(f"#{11000 + register}={length}")
+        else:
+            self.alone(f"G10 L10 P{register} R{length}")
+        return register
 
     def tip(self, chance: random.Random) -> None:
         """Tool-centre-point control, on or off."""
@@ -400,6 +434,15 @@ class IsoModes(Author):
 
         self.wrap(chance, close)
 
+    def quiet(self, chance: random.Random) -> None:
+        """Codes that move nothing and change no coordinates."""
+        if self.dialect in (*MACRO, "iso"):
+            self.alone(
+                chance.choice(["G8 P1", "G5.1 Q1", "G5 P10000", "G5 P0", "G5.1 Q2 X0 Y0 Z0", "M8", "G23", "G11"])
+            )
+        if self.dialect in MACRO and chance.random() < 0.5:
+            self.alone(chance.choice(["G10 L12 P5 R4.", "#3006=1(LOOK)", "#140=#0", "M97", "DPRNT[X#140[42]]"]))
+
     def skip(self, chance: random.Random) -> None:
         """A block with a slash."""
         if self.setup.block_skip is True:
@@ -412,4 +455,5 @@ class IsoModes(Author):
     REWRITES: ClassVar[dict[str, float]] = {
         "increments": 3, "units": 2, "feeds": 1, "zero": 2, "preset": 1, "offsets": 1, "rotate": 2, "reflect": 1,
         "lengths": 2, "tip": 2, "tilted": 2, "jump": 1, "loop": 1, "call": 1, "skip": 1, "table": 1,
+        "quiet": 1,
     }  # fmt: skip

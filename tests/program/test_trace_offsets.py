@@ -10,6 +10,7 @@ import pytest
 
 from ncfix.control.setup import Tool
 from ncfix.diagnostics import SourceError
+from ncfix_iso.rs274.motion import AFTER_REFERENCE
 from program.tracing import KNOWN, ZERO, ends, follow, last, reasons
 
 HALF = math.sqrt(0.5)
@@ -309,6 +310,23 @@ def test_high_speed_cycles_whose_data_are_in_variables_move_axes(dialect: str, k
         assert [each[:32] for each in found] == ["", "high-speed cycle machining (G5 P", "", ""]
         cut = reasons(follow(f"G21 G0 X1. Y1. Z1.\nG5 {kind}\nG1 X2. F9.", **setup))
         assert "the control makes up" in cut[-1]
+
+
+@pytest.mark.parametrize("dialect", ["iso", "fanuc", "haas"])
+@pytest.mark.parametrize("which", ["", " P2", " P3", " P4", " P[#500]"])
+def test_where_the_third_reference_point_lies_is_not_known(dialect: str, which: str) -> None:
+    places = {"G28": dict.fromkeys("XYZ", 0.0), "G30": dict.fromkeys("XYZ", 100.0)}
+    text = f"G21 G0 X1. Y1. Z1.\nG91 G30{which} Z0\nG90 G1 X2. F9.\nX3. Y2. Z1."
+    found = reasons(follow(text, dialect=dialect, no_point="calculator", references=places))
+    assert found[1].startswith("reference point") or "G30" in found[1]
+    assert found[2] == ("" if which in ("", " P2") else AFTER_REFERENCE.format("Z"))
+
+
+def test_a_figure_that_is_copied_moves_all_axes() -> None:
+    """G72.1 of Fanuc turns what a subprogram makes; in a text that nothing else tells from ISO, too."""
+    found = reasons(follow("G21 G0 X1. Y1. Z1.\nG72.1 P9 L3 R30.\nG1 X2. Z2. F9.\nY2.", dialect="iso"))
+    assert "turning cycle" in found[1]
+    assert "the axis Y stands after a turning cycle" in found[2]
 
 
 def test_the_first_work_offset_is_in_force_at_the_start() -> None:

@@ -1,4 +1,4 @@
-"""Reference points of these controls: G28 goes to the first, G27 checks one, G30 Pn goes to a further one.
+"""Reference points of these controls: G28 goes to the first, G27 checks one.
 
 Sources: Fanuc 30i operator's manual (machining centre), "Reference position": G27 is a rapid to its words; Haas mill
 operator's manual, G28, G49.
@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 from ncfix.control.moves import Motion, MotionEnd, MotionKind, Pass, Passing
 from ncfix_iso.rs274.control import Block, RS274Control
-from ncfix_iso.rs274.motion import AFTER_REFERENCE, REFERENCE_POINT, destination, go_to_reference, goes_by_way
-from ncfix_iso.rs274.parameters import whole
+from ncfix_iso.rs274.motion import REFERENCE_POINT, destination, go_to_reference
 from ncfix_iso.rs274.settings import tool_offset
 
 if TYPE_CHECKING:
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
 
 CHECKED = Passing(Pass.REFERENCE_POINT, "reference point check (G27)")
 AFTER_ALL = "where the axis {} stands after G28 that names no axis differs from control to control"
-SECOND = 2
 NO_LENGTH = 490
 
 
@@ -47,19 +45,3 @@ def cancelling(control: MacroControl, block: Block, code: int) -> None:
     if control.length_code:
         control.length_code = 0
         tool_offset(control, Block(block.index, {}, frozenset(), 0), NO_LENGTH)
-
-
-def further(control: RS274Control, block: Block, code: int) -> None:
-    """G30 Pn: by way of the words to a further reference point; the third and fourth are not known."""
-    number = whole(block.get("P", SECOND), "P of G30")
-    if number == SECOND:
-        go_to_reference(control, block, code)
-        return
-    way = destination(control, block)
-    passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(f"G30 P{number}"))
-    if goes_by_way(control, block):
-        control.make(Motion(MotionKind.RAPID, block.axes, way, control.modal.motion, passing=passing))
-    taken = [index for index in control.axis_indices if block.axes >> index & 1 or not block.axes]
-    unknown = control.unknown | dict.fromkeys(taken, AFTER_REFERENCE)
-    end = MotionEnd(control.position[:], unknown)
-    control.make(Motion(MotionKind.RAPID, block.axes, end, control.modal.motion, passing=passing))

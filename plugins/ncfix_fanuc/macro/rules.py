@@ -125,7 +125,6 @@ FANUC = Rules(
         270: references.check,
         280: references.named,
         290: data.made,
-        300: references.further,
         **dict.fromkeys((430, 434, 435, 440, 490, 491), lengths.tool_offset),
         500: coordinates.switch_scaling,
         510: coordinates.switch_scaling,

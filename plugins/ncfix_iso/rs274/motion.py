@@ -177,6 +177,7 @@ DWELL = Passing(Pass.DWELL, "dwell")
 AFTER_G53 = "where the axis {} stands after G53 in incremental coordinates (G91) differs from control to control"
 AFTER_PROBING = "where the axis {} stands after probing is known only at run time"
 WITH_CANCEL = "what a word {} beside G80 does differs from control to control: say G0 or G1 in the block"
+SECOND_POINT = 300
 AFTER_REFERENCE = "where the axis {} stands after the reference point is approached is not given"
 AFTER_CYCLE = "where the axis {} stands after a turning cycle is not followed"
 NO_CODE = -2
@@ -254,9 +255,13 @@ def one_way(control: RS274Control, block: Block, code: int) -> None:
 
 
 def go_to_reference(control: RS274Control, block: Block, code: int) -> None:
-    """G28 and G30: via the words of the block to the reference point, along the axes named, or along all."""
-    name = f"G{code // 10}"
-    passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(name))
+    """G28 and G30: via the words of the block to the reference point, along the axes named, or along all.
+
+    P of G30 names the second, third or fourth; where the last two lie is not known (not in LinuxCNC).
+    """
+    name, which = f"G{code // 10}", block.get("P", 2.0)
+    further = code == SECOND_POINT and (which != 2.0 or "P" in block.unknown)
+    passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(f"{name} P{which:g}" if further else name))
     modal = control.modal.motion
     checked, control.offset_checked = control.offset_checked, True
     way = destination(control, block)
@@ -264,7 +269,9 @@ def go_to_reference(control: RS274Control, block: Block, code: int) -> None:
     if goes_by_way(control, block):
         control.make(Motion(MotionKind.RAPID, block.axes, way, modal, passing=passing))
     axes = block.axes or mask_of(control.axis_indices)
-    end = reference_target(control, name, axes)
+    lost = dict.fromkeys((i for i in control.axis_indices if axes >> i & 1), AFTER_REFERENCE)
+    nowhere = MotionEnd(control.position[:], control.unknown | lost)
+    end = nowhere if further else reference_target(control, name, axes)
     control.make(Motion(MotionKind.RAPID, block.axes, end, modal, passing=passing))
 
 
@@ -406,9 +413,12 @@ def high_speed(control: RS274Control, block: Block, code: int) -> None:
 
 
 def turning_cycle(control: RS274Control, block: Block, code: int) -> None:
-    """G70 to G72 of turning: their path is written elsewhere in the program."""
+    """G70 to G72 of turning: their path is written elsewhere in the program.
+
+    On other controls than LinuxCNC these codes may be patterns of holes, or copies of a figure, which move Y, too.
+    """
     unknown = dict(control.unknown)
-    for letter in "XZ":
+    for letter in "XZ" if control.rules.strict else "XYZ":
         if INDEX[letter] in control.axis_indices:
             unknown[INDEX[letter]] = AFTER_CYCLE
     refusal = f"turning cycle (G{code / 10:g})"
