@@ -437,9 +437,8 @@ class IsoModes(Author):
     def quiet(self, chance: random.Random) -> None:
         """Codes that move nothing and change no coordinates."""
         if self.dialect in (*MACRO, "iso"):
-            self.alone(
-                chance.choice(["G8 P1", "G5.1 Q1", "G5 P10000", "G5 P0", "G5.1 Q2 X0 Y0 Z0", "M8", "G23", "G11"])
-            )
+            ahead = ["G8 P1", "G5.1 Q1", "G5 P10000", "G5 P0", "G5.1 Q2 X0 Y0 Z0"]
+            self.alone(chance.choice([*ahead, "M8", "G23", "G11"]))
         if self.dialect in MACRO and chance.random() < 0.5:
             self.alone(chance.choice(["G10 L12 P5 R4.", "#3006=1(LOOK)", "#140=#0", "M97", "DPRNT[X#140[42]]"]))
 

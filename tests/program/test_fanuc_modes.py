@@ -198,3 +198,18 @@ def test_increments_of_zero_to_a_reference_point_lead_by_no_way(code: str, angle
     moves = follow(text, "XYZAC", setup=SETUP, dialect="fanuc").moves
     assert (moves.block == 2).sum() == 1
     assert (follow(text.replace("Z0\n", "Z1.\n"), "XYZAC", setup=SETUP, dialect="fanuc").moves.block == 2).sum() == 2
+
+
+@pytest.mark.parametrize("mode", ["G16", "G51X0Y0Z0P2."])
+def test_words_beside_a_computed_code_are_polar_or_scaled_like_others(mode: str) -> None:
+    """G#1 with a 1 in #1 is G1."""
+    text = "G21G0X0Y0Z0\n#1=1\n{}\n{}X20.Y60.F100.\nX9.Y30."
+    said, computed = (ends(follow(text.format(mode, code), setup=SETUP, dialect="fanuc")) for code in ("G1", "G#1"))
+    assert computed == said
+    assert said[1] == [pytest.approx(each) for each in ([10.0, 300**0.5, 0.0] if mode == "G16" else [40.0, 120.0, 0.0])]
+
+
+def test_a_computed_macro_call_is_refused() -> None:
+    """It was passed over."""
+    found = reasons(follow("G21G0X1.\n#1=65\nG#1P9\nX2.\nM30\nO9\nX5.\nM99", setup=SETUP, dialect="fanuc"))
+    assert ["macro call" in reason for reason in found] == [False, True]

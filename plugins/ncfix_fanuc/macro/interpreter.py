@@ -38,6 +38,7 @@ BEFORE_CALL = "GMFST"
 """Words that take effect before a macro is called if they stand before the call."""
 BESIDE_CALL = "a code before G65 is computed, so the program cannot be written out flat"
 MODAL_CALL = "G66 calls the program O{}, which is not at hand, so the program cannot be written out flat"
+COMPUTED_CALL = "the code of a macro call (G65, G66) is computed"
 NAME = re.compile(r"<(?P<angle>[^<>]+)>|\"(?P<quoted>[^\"]+)\"")
 
 
@@ -196,18 +197,21 @@ class MacroInterpreter(RS274Interpreter):
         block = super().evaluate(plan, index)
         if plan.assignments:
             block.unknown |= {letter for letter, _, _ in plan.computed}  # whether they are set before is not certain
-        codes = set() if plan.codes is None else set(plan.codes.g.values())
+        said = plan.codes or self.computed_codes(plan)
+        codes = set(said.g.values())
         self.at_once(codes)
         self.take_points(plan, block)
         if G16 in codes:
             coordinates.switch_polar(self.control, block, G16)
-        if self.control.polar is not None and G15 not in codes and plan.codes is not None and not plan.codes.takes:
+        if self.control.polar is not None and G15 not in codes and not said.takes:
             block = coordinates.cartesian(self.control, block)
         if coordinates.ON in codes and "P" in plan.pointless:
             block.unknown |= {"P"}  # thousandths or hundred-thousandths, as a parameter says
         for code in codes & PATTERNS.keys():
             check_points(self.control, plan, block, code)
-        return block if plan.codes is None else coordinates.scaled(self.control, block, plan.codes)
+        if plan.codes is None and MACRO in said.g:
+            self.control.refuse_rest(COMPUTED_CALL)
+        return coordinates.scaled(self.control, block, said)
 
     def take_points(self, plan: RS274Plan, block: Block) -> None:
         """Convert numbers without a decimal point as the setup says."""
