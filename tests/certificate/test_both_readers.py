@@ -195,6 +195,10 @@ CONTROLS = {
     "G54 P2 is no G54": ("fanuc", "G54 P2\nG0 X10. Y10.\nG1 X30. F300.\nG54\nX20. Y20.\n", False),
     "G54 beside a dwell": ("fanuc", "G54 G4 P200\nG0 X10. Y10.\nG1 X30. F300.\n", True),
     "G30 P3 is not the second point": ("fanuc", "G91 G30 P3 Z0.\nG90 G0 Z60.\nG1 X30. F300.\n", True),
+    "H alone is another length": ("fanuc", "G43 H1 Z90.\nH2\nG0 Z80.\nG1 X30. F300.\nX10.\n", False),
+    "H0 is no length": ("fanuc", "G43 H0 Z90.\nG1 X30. F300.\nX10.\n", False),
+    "H0 beside G49": ("fanuc", "G49 H0\nZ90.\nG1 X30. F300.\nX10.\n", True),
+    "G43 without H is the last one": ("fanuc", "G43 H1 Z90.\nT2 M6\nG43 Z80.\nG1 X30. F300.\nX10.\n", False),
     "G5 P10001 moves axes": ("fanuc", "G5 P10001\nG1 X30. F300.\nG0 X10. Y10. Z60.\nG1 X20. F300.\n", False),
     "G5 P10000 moves none": ("fanuc", "G5 P10000\nG1 X30. F300.\nG0 X10. Y10. Z60.\nG1 X20. F300.\nG5 P0\n", True),
 }
@@ -203,7 +207,8 @@ CONTROLS = {
 @pytest.mark.parametrize(("dialect", "text", "all_of_it"), CONTROLS.values(), ids=CONTROLS)
 def test_what_controls_of_one_family_do_differently_is_no_alarm(dialect: str, text: str, all_of_it: bool) -> None:
     places = {"G54": {"X": 5.0, "Y": 6.0, "Z": 7.0}, "G54.1P2": {"X": -20.0, "Y": 3.0, "Z": 9.0}}
-    setup = replace(SETUP, work_offsets=places, references={"G28": {"Z": 150.0}, "G30": {"Z": 120.0}})
+    tools = {0: Tool(60.0), 1: Tool(80.0), 2: Tool(45.5)}
+    setup = replace(SETUP, tools=tools, work_offsets=places, references={"G28": {"Z": 150.0}, "G30": {"Z": 120.0}})
     source = f"%\nO1\nG21 G17 G40 G49 G80 G90 G94 G54\nT1 M6\nG0 X0. Y0. Z80.\n{text}M30\n%\n".encode()
     known, language = machine("three"), get(dialect)
     fixed = fix_program(read(source, "part", language), known, setup, FixOptions(allow_refused=True)).text

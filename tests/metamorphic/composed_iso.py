@@ -29,6 +29,7 @@ class IsoAuthor(IsoModes):
         """A motion to a place; increments begin where the program has said where the axes stand."""
         turns = (target[3:] != self.q[3:]).any() or self.unsaid & set(self.letters[3:])
         if self.pointing and turns and self.pointed(target) is None:
+            self.absolute()
             self.tip(self.style)
         if code in ("0", "1"):
             self.way = float(np.linalg.norm((target - self.q)[:3]))

@@ -281,6 +281,8 @@ class WordAddressFollower(AxisFollower):
         """
         apart, fixed, length_set = "", False, False
         self._other_words(line)
+        if self.family is Family.WORDS and self._doubts_length(line, codes):
+            self.lose("H0, H without G43, or G43 without H behind another tool")
         for code in codes:
             match code:
                 case 40:
@@ -302,6 +304,13 @@ class WordAddressFollower(AxisFollower):
         if self.tcp and not length_set and any(code in (540, 550, 560, 570) for code in codes):
             self.unsay("XYZ")
         return apart, fixed or any(word.name == "SUPA" for word in line.codes)
+
+    def _doubts_length(self, line: TextLine, codes: Sequence[int]) -> bool:
+        """Whether a line selects a tool length in a way that differs from control to control."""
+        number, sets = line.code("H"), not {430, 434, 435, 440}.isdisjoint(codes)
+        if number is None:
+            return sets and self.last_length not in (None, self.tool)
+        return (number == 0 or not sets) and 490 not in codes
 
     def _is_extended(self, line: TextLine, codes: Sequence[int]) -> bool:
         """Whether G54 is an additional work offset, G54.1 Pn: its P belongs to no other code."""
@@ -428,6 +437,7 @@ class WordAddressFollower(AxisFollower):
     def _length_offset(self, line: TextLine, tcp: bool) -> None:
         number = line.code("H")
         tool = int(number) if number is not None else self.tool
+        self.last_length = self.last_length if number is None else int(number)
         if any(word.name == "H" and word.value is None for word in line.codes):
             self.lose("a length offset is a formula")
         if self.turn is not None and self.turn.tilted:

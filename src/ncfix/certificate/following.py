@@ -82,6 +82,8 @@ class AxisFollower(FollowedAxes):
         self.modal_call: HoleCall | None = None
         """The cycle of MCALL, which follows each motion."""
         self.pole: dict[str, float] = {}
+        self.last_length: int | None = None
+        """The last H of G43."""
         self.variables: dict[str, float | None] = {}
         """Values of variables and parameters; None: not known."""
         self.foreign: set[int] = set()
