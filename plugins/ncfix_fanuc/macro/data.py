@@ -1,6 +1,7 @@
-"""G10 of these controls: work offsets (L2, L20) and tool lengths (L10); other data are not followed.
+"""G10 of these controls: work offsets (L2, L20) and tool lengths (L10); other data are not followed. Reference points.
 
-Source: Fanuc 30i operator's manual (machining centre), "Programmable data input".
+Sources: Fanuc 30i operator's manual (machining centre), "Programmable data input"; "Reference position": G27 is a
+rapid to its words; Haas mill operator's manual, G28, G49.
 """
 
 from __future__ import annotations
@@ -9,11 +10,12 @@ from typing import TYPE_CHECKING
 
 from ncfix.control.coordinates import DEGREE, LETTERS, Z, mask_of
 from ncfix.control.expressions import Unknown, Value, nominal
-from ncfix.control.moves import Motion, MotionKind
+from ncfix.control.moves import Motion, MotionEnd, MotionKind, Pass, Passing
 from ncfix.control.operations import make_up
 from ncfix_iso.rs274.control import Block, RS274Control
-from ncfix_iso.rs274.motion import destination
+from ncfix_iso.rs274.motion import REFERENCE_POINT, destination, go_to_reference
 from ncfix_iso.rs274.parameters import whole
+from ncfix_iso.rs274.settings import tool_offset
 from ncfix_iso.rs274.systems import (
     AFTER_UNFOLLOWED,
     SYSTEM_NAMES,
@@ -57,6 +59,9 @@ UNFOLLOWED = {
     52: "parameters of the control (G10 L52)",
 }
 CHANGED = "the length of the tool is changed while it is in force (G10 L10, #11001), which acts sooner or later"
+CHECKED = Passing(Pass.REFERENCE_POINT, "reference point check (G27)")
+AFTER_ALL = "where the axis {} stands after G28 that names no axis differs from control to control"
+NO_LENGTH = 490
 TOOL_LIFE = 3
 RADIUS = 12
 HARMLESS = frozenset({TOOL_LIFE, RADIUS, 13})
@@ -195,3 +200,32 @@ def keep_length(control: RS274Control, number: int, length: Value) -> None:
     control.tools.lengths[number] = nominal(length)
     if unknown:
         control.tools.measured.add(number)
+
+
+# -- reference points ------------------------------------------------------------------------------------------------
+
+
+def check_reference(control: RS274Control, block: Block, code: int) -> None:
+    """G27: a rapid to the words, which should be a reference point."""
+    if block.axes:
+        end = destination(control, block)
+        control.make(Motion(MotionKind.RAPID, block.axes, end, control.modal.motion, passing=CHECKED))
+
+
+def to_reference(control: RS274Control, block: Block, code: int) -> None:
+    """G28: the named axes go to the reference point; if none is named, controls differ in whether all go."""
+    if block.axes:
+        go_to_reference(control, block, code)
+        return
+    unknown = control.unknown | dict.fromkeys(control.axis_indices, AFTER_ALL)
+    passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format("G28"))
+    end = MotionEnd(control.position[:], unknown)
+    control.make(Motion(MotionKind.RAPID, 0, end, control.modal.motion, passing=passing))
+
+
+def to_reference_without_length(control: MacroControl, block: Block, code: int) -> None:
+    """G28 of Haas, which also cancels the tool length offset."""
+    go_to_reference(control, block, code)
+    if control.length_code:
+        control.length_code = 0
+        tool_offset(control, Block(block.index, {}, frozenset(), 0), NO_LENGTH)

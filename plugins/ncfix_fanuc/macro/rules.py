@@ -18,7 +18,7 @@ from ncfix.control.coordinates import LETTERS
 from ncfix.control.expressions import Fault, Unknown
 from ncfix.control.operations import BlockValues, Destination, Like, Operation, Refuse
 from ncfix.values import frozen
-from ncfix_fanuc.macro import coordinates, data, lengths, patterns, references, tilt
+from ncfix_fanuc.macro import coordinates, data, lengths, patterns, tilt
 from ncfix_fanuc.macro.variables import compiled, is_lasting, is_system
 from ncfix_iso.rs274 import groups
 from ncfix_iso.rs274.control import Block, RS274Control
@@ -122,8 +122,8 @@ FANUC = Rules(
         100: data.set_data,
         150: coordinates.switch_polar,
         160: coordinates.switch_polar,
-        270: references.check,
-        280: references.named,
+        270: data.check_reference,
+        280: data.to_reference,
         290: data.made,
         **dict.fromkeys((430, 434, 435, 440, 490, 491), lengths.tool_offset),
         500: coordinates.switch_scaling,
@@ -200,7 +200,7 @@ HAAS = replace(
         HAAS_CYLINDER: coordinates.map_on_cylinder,
         **dict.fromkeys((tilt.DYNAMIC_ON, tilt.DYNAMIC_OFF), tilt.dynamic_offset),
         lengths.HAAS_TIP: lengths.tool_offset,
-        280: references.cancelling,
+        280: data.to_reference_without_length,
     },
     takes=FANUC.takes | {*HAAS_MADE, *HAAS_FEATURE, *HAAS_MIRRORS, HAAS_CYLINDER},
     repeats="L",

@@ -32,10 +32,8 @@ WORDS_QUIET = re.compile(
 )
 """Words of SINUMERIK that move nothing and change no coordinates."""
 DECLARES = frozenset(("DEF", "EXTERN"))
-STORED_CYCLES = 10001
-"""Least P of G5 that moves axes, by data in the control; smaller ones say how far ahead it looks."""
-OF_THE_CONTROL = 2000
-"""Least number of a variable that may be an offset or a position of the control."""
+STORED_CYCLES, OF_THE_CONTROL = 10001, 2000
+"""Least P of G5 that moves axes, by data in the control, and least number of a variable that may be the control's."""
 SINGLE = frozenset("GNFSTDMHPLEQO")
 """Letters of words that are handled, or have no effect here."""
 
@@ -122,8 +120,8 @@ class WordAddressFollower(AxisFollower):
         own = {word.name for word in line.codes}
         if self.family is not Family.WORDS or line.odd:
             return False
-        looks_ahead = codes == [1870] or (codes == [50] and (line.code("P") or 0.0) < STORED_CYCLES)
-        return (codes == [51] and "Q" in own) or (looks_ahead and not line.path)
+        ahead = codes == [1870] or (codes == [50] and (line.code("P") or 0.0) < STORED_CYCLES)
+        return (codes == [51] and "Q" in own) or (ahead and not line.path)
 
     def _changed_coordinates(self, line: TextLine, codes: Sequence[int]) -> bool:
         """Apply a line that only shifts or turns the coordinates, by plain numbers; False if it does not."""
@@ -314,8 +312,7 @@ class WordAddressFollower(AxisFollower):
 
     def _is_extended(self, line: TextLine, codes: Sequence[int]) -> bool:
         """Whether G54 is an additional work offset, G54.1 Pn: its P belongs to no other code."""
-        calls = any(word.name == "M" for word in line.codes)
-        return self.family is Family.WORDS and line.code("P") is not None and not calls and 40 not in codes
+        return self.family is Family.WORDS and line.code("P") is not None and line.code("M") is None and 40 not in codes
 
     def _took_mode(self, code: int) -> bool:
         """Apply a code of motion, plane, unit, distance, feed or cutter compensation; False for any other code."""
@@ -452,8 +449,8 @@ class WordAddressFollower(AxisFollower):
         """A motion in machine coordinates, or to a reference point."""
         named = {axis: word for axis, word in words.items() if axis in self.at}
         if 280 in codes or 300 in codes:
-            second = line.code("P") in (None, 2.0)
-            point = self.given.references.get("G28" if 280 in codes else "G30" if second else "", {})
+            name = "G28" if 280 in codes else "G30" if line.code("P") in (None, 2.0) else ""
+            point = self.given.references.get(name, {})
             end = dict(self.at)
             for axis in named or self.axes:
                 end[axis] = point.get(axis, NAN)
