@@ -374,19 +374,6 @@ def _parts(handle: int) -> Iterator[bytes]:
         at += len(part)
 
 
-def _named(handle: int, name: str, folder: int) -> bool:
-    """Give an unnamed file a name, which must be free; returns False if the system cannot do that."""
-    try:
-        os.link(f"/proc/self/fd/{handle}", name, src_dir_fd=folder, dst_dir_fd=folder)  # else it would not be followed
-    except FileExistsError:
-        raise
-    except OSError as error:
-        if error.errno in UNKNOWN:
-            return False
-        raise
-    return True
-
-
 def _make_like(handle: int, like: Like) -> None:
     """Give a new file the owner and mode of another file, or a mode."""
     if isinstance(like, int):
@@ -398,10 +385,13 @@ def _make_like(handle: int, like: Like) -> None:
         os.chmod(handle, stat.S_IMODE(like.st_mode))
 
 
-def _link(old: str, new: str, folder: int) -> bool:
-    """Give a file in a folder a second name there, which must be free; returns False if links are not supported."""
+def _link(old: str, new: str, folder: int, *, follow: bool = False) -> bool:
+    """Give a file in a folder a second name there, which must be free; returns False if the system cannot do that.
+
+    follow  `old` is a symbolic link to the file
+    """
     try:
-        os.link(old, new, src_dir_fd=folder, dst_dir_fd=folder, follow_symlinks=False)
+        os.link(old, new, src_dir_fd=folder, dst_dir_fd=folder, follow_symlinks=follow)
     except FileExistsError:
         raise
     except OSError as error:
@@ -409,6 +399,11 @@ def _link(old: str, new: str, folder: int) -> bool:
             return False
         raise
     return True
+
+
+def _named(handle: int, name: str, folder: int) -> bool:
+    """Give an unnamed file a name in a folder, as `_link`."""
+    return _link(f"/proc/self/fd/{handle}", name, folder, follow=True)
 
 
 def _sync(folder: int) -> None:

@@ -39,11 +39,9 @@ ODD = "of this arc the interpreter has more to say"
 class KlartextBlockRows:
     """A stretch of n blocks, one row per block.
 
-    path    (n + 1, 9) the command before the first block, and at the end of each block
-    feed    (n,) feed in force, mm/min
-    motion  (n,) `RAPID`, `FEED`, or the code of an arc
-    side    (n,) radius compensation in force: 0, 41 or 42
-    mask    (n,) bit mask of the axes that the block names; 0 if it moves nothing
+    path, feed, mask  as in `BlockRows`; a block that names no axis moves nothing
+    motion            (n,) `RAPID`, `FEED`, or the code of an arc
+    side              (n,) radius compensation in force: 0, 41 or 42
     """
 
     path: Array
@@ -54,8 +52,6 @@ class KlartextBlockRows:
 
     def head(self, count: int) -> KlartextBlockRows:
         """The first `count` blocks."""
-        if count == len(self.feed):
-            return self
         return KlartextBlockRows(
             self.path[: count + 1], self.feed[:count], self.motion[:count], self.side[:count], self.mask[:count]
         )

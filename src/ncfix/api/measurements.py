@@ -11,7 +11,7 @@ from ncfix.api.sources import (
     as_machine,
     as_measurements,
     as_names,
-    check_list,
+    check_effects,
     check_writable,
     sound_machine,
     write_output,
@@ -54,7 +54,7 @@ def plan(
     from ncfix.measure.measurement import dumps
     from ncfix.measure.plan import plan as planned
 
-    check_list("effects", effects)
+    check_effects(effects)
     check_writable(output, force, machine, existing)
     known = as_machine(machine)
     before = [] if existing is None else as_measurements(existing, known)
@@ -124,7 +124,7 @@ def calibrate(
     from ncfix.measure.calibrate import guesses, over_the_travels
     from ncfix.measure.contradictions import refusals
 
-    check_list("effects", effects)
+    check_effects(effects)
     check_writable(output, force, measured, machine)
     known = as_machine(machine)
     found = calibrated(as_measurements(measured, known), known, effects, loss, prune, knots, time_constants)

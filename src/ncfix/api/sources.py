@@ -165,10 +165,10 @@ def as_names(argument: str, given: Sequence[str]) -> tuple[str, ...]:
     return tuple(given)
 
 
-def check_list(argument: str, given: str | None) -> None:
-    """Refuse anything but one string of names separated by commas: `UsageError` NCF025."""
+def check_effects(given: str | None) -> None:
+    """Refuse effects that are not one string of names separated by commas: `UsageError` NCF025."""
     if given is not None and not isinstance(given, str):
-        raise UsageError.of("NCF025", f"{argument}={given!r}", hint=f"{argument}='EC0Y,E?X', one text")
+        raise UsageError.of("NCF025", f"effects={given!r}", hint="effects='EC0Y,E?X', one text")
 
 
 def as_measurements(measured: Measured | Sequence[Measured], machine: Machine) -> list[Measurement]:

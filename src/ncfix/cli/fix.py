@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix.arguments import BLOCK_NUMBERS
-from ncfix.batch.programs import program_files
+from ncfix.batch.programs import ProgramFile, program_files, subprograms
 from ncfix.cli import console
 from ncfix.cli.options import (
     PATH,
     OneOf,
     Positive,
+    dialect_of,
     dialect_option,
     json_option,
     load_machine,
@@ -26,8 +27,8 @@ from ncfix.cli.options import (
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.shop.projects import ProjectCommand, after_next_groups, group_of, is_from_file, project_options
-from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, targets
-from ncfix.diagnostics import UsageError
+from ncfix.cli.targets import JSON, STREAM, Outputs, OutputTarget, check_streams, read, shown, targets
+from ncfix.diagnostics import ExitCode, UsageError, visible
 from ncfix.host import processors
 from ncfix.plugins import registry
 
@@ -35,11 +36,14 @@ if TYPE_CHECKING:
     from ncfix.batch.work import ExecutorMaker
     from ncfix.cli.shop.batch import Batch, FixJob
     from ncfix.cli.shop.pages import Pages
+    from ncfix.compensate.changes import Changes, MotionChange
 
 BATCHES = "ncfix.batches"
 """Key in the context for the batches of preceding groups of programs."""
 AUTO = 0
 """`--jobs auto` as a number: as many processes as are useful."""
+CHANGE_COLUMNS = ("line", "axis", "from", "to", "change", "why")
+"""Columns of `--diff-motions`."""
 PAYS_BYTES = 8 << 20
 """Text size, bytes, per additional process: correcting it takes ten times as long as starting a process."""
 PAYS_PROGRAMS = 8
@@ -303,8 +307,6 @@ def _changes(
     context: click.Context, job: FixJob, programs: Sequence[str], apart: str | None, motions: bool, as_json: bool
 ) -> int:
     """Show what would change in these programs and in those of following groups; returns the worst exit code."""
-    from ncfix.cli.shop.changes import show_changes
-
     only, before = group_of(context).programs, context.meta.setdefault(BATCHES, [])
     wanted = [each for each in program_files(programs, apart) if only is None or each.path in only]
     before += [show_changes(job, each, motions, as_json) for each in wanted]
@@ -313,6 +315,57 @@ def _changes(
     if as_json:
         console.put_json(files=[entry for _, entry in before])
     return max(int(code) for code, _ in before)
+
+
+def show_changes(job: FixJob, program: ProgramFile, motions: bool, as_json: bool) -> tuple[int, dict[str, Any]]:
+    """Print what would change in a program; returns the exit code and the entry in the JSON object."""
+    from ncfix.compensate.changes import Changes, as_plain
+    from ncfix.text.reader import read as read_source
+
+    path = program.path
+    name = shown(path)
+    entry: dict[str, Any] = {"path": name}
+    if why := program.left_out:
+        console.tell(why)
+        return ExitCode.DONE, {**entry, "left_out": True, "changed": False, "motions": [], "refused": []}
+    try:
+        with console.busy(f"fixing {name}"):
+            text = read(path)
+            source = read_source(text, name, dialect_of(text, name, job.dialect, job.machine))
+            find = subprograms(job.setup, path)
+            changes = Changes.of(source, job.machine, job.setup, job.options, find)
+            found = list(changes.motions())
+    except Exception as error:
+        own = console.owned(error)
+        console.tell(*own.messages)
+        return own.exit_code, {**entry, "errors": own.messages}
+    report = changes.fixed.report
+    refused = report.refusals
+    console.tell_some([*report.warnings, *refused])
+    if refused and not job.options.allow_refused:
+        console.say(
+            f"{visible(name)}: {console.counted(len(refused), 'motion')} refused, so `ncfix fix` would write nothing"
+        )
+        return ExitCode.REFUSED, {**entry, "changed": False, "motions": [], "refused": refused}
+    if not as_json:
+        _put_changes(changes, found, motions, text, name)
+    entry |= {"changed": changes.fixed.changed, "motions": as_plain(found), "refused": []}
+    return ExitCode.FINDINGS if changes.fixed.changed else ExitCode.DONE, entry
+
+
+def _put_changes(changes: Changes, found: list[MotionChange], motions: bool, text: bytes, name: str) -> None:
+    if not motions:
+        console.put(b"".join(changes.unified(text, name, f"{name} (corrected)")))
+        return
+    if found:
+        console.put(f"{visible(name)}\n")
+        console.table(CHANGE_COLUMNS, [_change_row(each) for each in found])
+
+
+def _change_row(each: MotionChange) -> tuple[str, ...]:
+    digits, unit = (5, "mdeg") if each.rotary else (4, "um")
+    places = (f"{value:.{digits}f}" for value in (each.before, each.after))
+    return (str(each.line), each.axis, *places, f"{each.change:+.1f} {unit}", each.reason)
 
 
 def _reported(batches: Sequence[tuple[Batch, int, ExecutorMaker]], as_json: bool, json_lines: bool) -> int:
