@@ -9,7 +9,7 @@ machine file (location errors, squareness, gains), which vary with the day and t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import field
 from functools import cached_property
 
@@ -54,10 +54,15 @@ WIDE_UM = 1e5
 """Prior standard deviation of the unknowns of the set-up, um."""
 TRIM = 0.97
 """Share of the values that count, the smallest residuals first: the rest may be outliers."""
+BENT_UM = 1e5
+"""A change of a prediction by so much changes it by half as much again in second order, um: a tenth of a metre, less
+than the reach of any machine."""
 EXACT_STEPS = 4
 """Most steps of least squares on the exact model."""
 EXACT_SETTLED_UM = 0.05
 """Largest change of a prediction, um, at which the iteration ends."""
+Hopeless = Callable[[float], bool]
+"""Whether a residual, um, is too large to be of interest."""
 
 
 @frozen(repr=False, slots=False)
@@ -374,12 +379,14 @@ class Misfit:
     loose: int
     fits: dict[float, tuple[float, Array]] = field(default_factory=dict)
 
-    def left(self, prior_um: float = TIGHT_UM) -> float:
+    def left(self, prior_um: float = TIGHT_UM, hopeless: Hopeless | None = None) -> float:
         """Root mean square residual, um, without the largest; changes of constants, against the prior, count as misfit.
 
         prior_um  standard deviation of the constants at the tool tip, for a machining centre of one metre
+        hopeless  whether a residual is too large to be of interest; the fit ends as soon as it is known to become so
+                  large, with infinity
         """
-        return self._fitted(prior_um)[0]
+        return self._fitted(prior_um, hopeless)[0]
 
     @property
     def count(self) -> int:
@@ -402,13 +409,16 @@ class Misfit:
         every = self._fitted(TIGHT_UM)[1]
         return every[len(every) - self.loose :]
 
-    def _fitted(self, prior_um: float) -> tuple[float, Array]:
+    def _fitted(self, prior_um: float, hopeless: Hopeless | None = None) -> tuple[float, Array]:
         """Residual, um, and constants, with a prior scaled to this machine's size."""
         if prior_um not in self.fits:
             large = times_a_machining_centre(self.problem.machine)
-            self.fits[prior_um] = _fitted(
-                self.problem, self.relative, self.noise, large * prior_um, self.loose, large * LOOSE_UM
+            found = _fitted(
+                self.problem, self.relative, self.noise, large * prior_um, self.loose, large * LOOSE_UM, hopeless
             )
+            if not np.isfinite(found[0]):
+                return found
+            self.fits[prior_um] = found
         return self.fits[prior_um]
 
 
@@ -421,14 +431,21 @@ def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequenc
 
 
 def _fitted(
-    problem: Problem, relative: Array, sigma: float, prior_um: float, free: int, loose_um: float
-) -> tuple[float, Array]:
-    """Residual, um, and coefficients by least squares on the exact model, with priors on all but the set-up."""
+    problem: Problem, relative: Array, sigma: float, prior_um: float, free: int, loose_um: float,
+    hopeless: Hopeless | None = None,
+) -> tuple[float, Array]:  # fmt: skip
+    """Residual, um, and coefficients by least squares on the exact model, with priors on all but the set-up.
+
+    hopeless  see `Misfit.left`. A step leaves what is expected to first order, within the second-order part, which is
+              no larger than that of the step before, or than the square of the step over `BENT_UM`
+    """
     start, k, scale = problem.selection.start, len(problem.start), problem.um / relative
     held: Array
+    expected = np.full(len(scale), np.inf)
+    given_up = False
 
     def step(at: tuple[Array, Array]) -> tuple[tuple[Array, Array], float]:
-        nonlocal held
+        nonlocal held, expected, given_up
         coefficients, unknowns = at
         columns = np.concatenate([problem.nuisance(unknowns), problem.design], axis=1) * scale[:, None]
         size = np.sqrt((columns**2).mean(axis=0))
@@ -441,10 +458,23 @@ def _fitted(
         back = -held * np.concatenate([np.zeros(k), coefficients - start])
         stacked = np.concatenate([columns / size, np.diag(sigma / allowed)])
         change = np.linalg.lstsq(stacked, np.concatenate([y, back]), rcond=1e-9)[0] / size
-        return (coefficients + change[k:], unknowns + change[:k]), float(np.abs(columns @ change).max(initial=0.0))
+        after, moved = (coefficients + change[k:], unknowns + change[:k]), columns @ change
+        most = float(np.abs(moved).max(initial=0.0))
+        if hopeless is not None:
+            bent = min(most**2 / BENT_UM, float(np.abs(y - expected).max(initial=0.0)))
+            expected = y - moved
+            given_up = hopeless(_trimmed(expected, held[k:] * (after[0] - start)) - bent)
+        return after, 0.0 if given_up else most
 
     (coefficients, unknowns), _ = gauss_newton(step, (start, problem.start), EXACT_STEPS, EXACT_SETTLED_UM)
-    y = np.abs(scale * problem.residual(coefficients, unknowns))
-    y = np.sort(np.where(np.isfinite(y), y, 1e12))[: int(TRIM * len(y))]
-    moved = held[k:] * (coefficients - start)
-    return float(np.sqrt(((y**2).sum() + (moved**2).sum()) / len(y))), coefficients
+    if given_up:
+        return np.inf, coefficients
+    left = scale * problem.residual(coefficients, unknowns)
+    return _trimmed(left, held[k:] * (coefficients - start)), coefficients
+
+
+def _trimmed(left: Array, moved: Array) -> float:
+    """Root mean square, um, of a residual (m,) without its largest values, and of the changes `moved` of constants."""
+    sizes = np.abs(left)
+    kept = np.sort(np.where(np.isfinite(sizes), sizes, 1e12))[: int(TRIM * len(sizes))]
+    return float(np.sqrt(((kept**2).sum() + (moved**2).sum()) / len(kept)))

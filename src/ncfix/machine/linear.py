@@ -11,11 +11,12 @@ nearer to the foundation at zero. For the joint's Jacobian it is converted to it
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import field
 
 import numpy as np
 
 from ncfix.arrays import Array
-from ncfix.machine.axes import BASE_AXES, ORIGIN, Axis, Effect, GaugeLine
+from ncfix.machine.axes import BASE_AXES, ORIGIN, Axis, Effect, GaugeLine, Vector
 from ncfix.machine.chain import advance, columns, cross, turned_with
 from ncfix.machine.error_model import (
     Dependence,
@@ -160,23 +161,47 @@ def joint_errors(axes: tuple[Axis, ...], tool: GaugeLine, effects: Sequence[Effe
     return errors
 
 
-def design(
-    axes: tuple[Axis, ...], tool: GaugeLine, effects: Sequence[Effect], shared: Dependences, poses: Poses
-) -> Array:
-    """See `Machine.design`; `shared` says how the effects depend on the state; poses last: (6, k, n)."""
-    n = poses.positions.shape[1]
-    joints = sorted({joint_index(axes, effect) for effect in effects})
-    by_joint = dict(zip(joints, np.moveaxis(joint_jacobian(axes, tool, poses, joints), 1, 0), strict=True))
-    responses: dict[object, Array] = {}
+@frozen(repr=False, eq=False, slots=False)
+class UnitResponses:
+    """The responses of the tool pose to effects of 1 mm or 1 rad at some poses; each is computed when first asked for.
+
+    jacobians  cache: joint -> (6, 6, n) derivative by its error twist
+    found      cache: what an effect moves, by its name and frame -> (6, n) response
+    """
+
+    axes: tuple[Axis, ...]
+    tool: GaugeLine
+    poses: Poses
+    jacobians: dict[int, Array] = field(default_factory=dict)
+    found: dict[tuple[str, Vector | None, bool], Array] = field(default_factory=dict)
+
+    def of(self, effects: Sequence[Effect]) -> list[Array]:
+        """The response of each effect, (6, n), poses last."""
+        new = sorted({joint_index(self.axes, effect) for effect in effects} - set(self.jacobians))
+        if new:
+            jacobian = joint_jacobian(self.axes, self.tool, self.poses, new)
+            self.jacobians.update(zip(new, np.moveaxis(jacobian, 1, 0), strict=True))
+        return [self._of(effect) for effect in effects]
+
+    def _of(self, effect: Effect) -> Array:
+        key = effect.name, effect.reference, effect.carried
+        if key not in self.found:
+            twist = unit_twist(self.axes, self.tool, effect, self.poses)
+            twist = np.broadcast_to(twist, (6, self.poses.positions.shape[1]))
+            self.found[key] = np.einsum("ijn,jn->in", self.jacobians[joint_index(self.axes, effect)], twist)
+        return self.found[key]
+
+
+def design(responses: Sequence[Array], shared: Dependences, poses: Poses) -> Array:
+    """See `Machine.design`: effects with these responses (r, n) to 1 mm or 1 rad; poses last: (r, k, n).
+
+    shared  how the effects depend on the state
+    """
     curves = [way.rows(poses) for way in shared.ways]
     ends = np.cumsum([0, *(len(curves[k]) for k in shared.own)]).tolist()
-    found = np.empty((6, ends[-1], n))
-    for effect, own, start, end in zip(effects, shared.own, ends[:-1], ends[1:], strict=True):
-        seen = (effect.name, effect.reference, effect.carried)
-        if seen not in responses:
-            twist = np.broadcast_to(unit_twist(axes, tool, effect, poses), (6, n))
-            responses[seen] = np.einsum("ijn,jn->in", by_joint[joint_index(axes, effect)], twist)
-        np.multiply(responses[seen][:, None], curves[own], out=found[:, start:end])
+    found = np.empty((len(responses[0]) if responses else 6, ends[-1], poses.positions.shape[1]))
+    for response, own, start, end in zip(responses, shared.own, ends[:-1], ends[1:], strict=True):
+        np.multiply(response[:, None], curves[own], out=found[:, start:end])
     return found
 
 

@@ -369,15 +369,29 @@ class Machine:
         shape, found = self._design(q, state, self.effects if effects is None else tuple(effects))
         return poses_first(found, shape)
 
-    def design_columns(self, q: Array, state: State, effects: Sequence[Effect]) -> Array:
-        """(6, k, n) like `design` for q (n, n_axes), but with poses last: faster for many effects."""
-        return self._design(q, state, tuple(effects))[1]
+    def design_columns(
+        self, q: Array, state: State, effects: Sequence[Effect], responses: linear.UnitResponses | None = None,
+        rows: int = 6,
+    ) -> Array:  # fmt: skip
+        """(rows, k, n) like the first rows of `design` for q (n, n_axes), but with poses last: faster for many effects.
 
-    def _design(self, q: ArrayLike, state: State, effects: tuple[Effect, ...]) -> tuple[tuple[int, ...], Array]:
-        """The common leading shape, and the design with poses last, (6, k, n)."""
+        responses  `unit_responses` of the same poses, for several designs
+        """
+        return self._design(q, state, tuple(effects), responses, rows)[1]
+
+    def unit_responses(self, q: Array, state: State) -> linear.UnitResponses:
+        """The responses of the tool pose to single errors at these poses."""
+        return linear.UnitResponses(self.axes, self.tool, self._with_signals(q, state, frozenset())[1])
+
+    def _design(
+        self, q: ArrayLike, state: State, effects: tuple[Effect, ...],
+        responses: linear.UnitResponses | None = None, rows: int = 6,
+    ) -> tuple[tuple[int, ...], Array]:  # fmt: skip
+        """The common leading shape, and the design with poses last, (rows, k, n)."""
         shared = linear.Dependences.of(self.axes, effects)
         shape, poses = self._with_signals(q, state, shared.signals)
-        return shape, linear.design(self.axes, self.tool, effects, shared, poses)
+        responses = responses or linear.UnitResponses(self.axes, self.tool, poses)
+        return shape, linear.design([each[:rows] for each in responses.of(effects)], shared, poses)
 
     def _poses(self, q: ArrayLike, state: State, model: ErrorModel | None) -> tuple[tuple[int, ...], Poses]:
         """The common leading shape, and the poses with all the signals that the model needs."""

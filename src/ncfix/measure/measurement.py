@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from ncfix.machine import Machine, State
 from ncfix.machine.axes import COMPONENTS, NAME
 from ncfix.values import frozen
 
+Label = TypeVar("Label", bound=Hashable)
 DIGITS = 9
 """Decimals of mm, degree and rad in files: beyond the resolution of any instrument."""
 STATES = re.compile(
@@ -255,7 +257,7 @@ def perhaps_right(measurements: Sequence[Measurement]) -> Sequence[tuple[str, ..
     return ((), CENTRE) if any(CENTRE[0] in each.columns for each in measurements) else ((),)
 
 
-def groups(labels: Sequence[str]) -> tuple[tuple[str, ...], Ints]:
+def groups(labels: Sequence[Label]) -> tuple[tuple[Label, ...], Ints]:
     """The distinct labels in order of appearance, and for each row the index of its label among these."""
     names = tuple(dict.fromkeys(labels))
     places = {name: index for index, name in enumerate(names)}

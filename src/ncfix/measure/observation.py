@@ -201,15 +201,15 @@ def repeatability(
     return float(np.sqrt(squares / freedom)) or None
 
 
-def _states(measurement: Measurement) -> list[str]:
-    """The state of each row that repeats share, as text; empty for a test of drift, or if only readings were noted."""
-    if measurement.stays:
-        return []
+def _states(measurement: Measurement) -> list[tuple[str | bytes, ...]]:
+    """The state of each row that repeats share; empty for a test of drift, or if only readings were noted."""
     labels = [value for name, value in measurement.labels.items() if name != "repeat"]
     between = (*measurement.measured, "time_s", "run")
     names = [name for name in measurement.columns if name not in between and not name.startswith("temp_")]
-    numbers = [tuple(measurement.columns[name].tolist()) for name in names]
-    return [str(state) for state in zip(*labels, *numbers, strict=True)]
+    if measurement.stays or not (labels or names):
+        return []
+    numbers = np.column_stack([np.zeros(len(measurement)), *(measurement.columns[name] for name in names)])
+    return list(zip(*labels, map(np.ndarray.tobytes, numbers), strict=True))
 
 
 # -- geometry ----------------------------------------------------------------------------------------------------------

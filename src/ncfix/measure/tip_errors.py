@@ -20,6 +20,7 @@ import numpy as np
 from ncfix.arrays import Array
 from ncfix.diagnostics import ConfigError
 from ncfix.machine import Effect, Machine, se3
+from ncfix.machine.linear import UnitResponses
 from ncfix.measure.measurement import SHIFTS, TURNS, Measurement, groups
 from ncfix.measure.observation import (
     Observation,
@@ -94,7 +95,8 @@ class TipErrors(Observation):
         """See `Observation`."""
         if self.observed_turn is not None:
             return self._picked(self.machine.design(self.q, self.state, effects))
-        every = self.machine.design_columns(self.q, self.state, effects)
+        rows = 6 if self._turns else 3
+        every = self.machine.design_columns(self.q, self.state, effects, self._responses, rows)
         picked = np.empty((every.shape[1], every.shape[2], len(self.components)))
         for place, name in enumerate(self.components):
             picked[:, :, place] = every[(*SHIFTS, *TURNS).index(name)]
@@ -103,6 +105,11 @@ class TipErrors(Observation):
     def unknown_design(self, unknowns: Array) -> Array:
         """See `Observation`."""
         return self._setup(unknowns, self.nominal[:, :3, :3])
+
+    @cached_property
+    def _responses(self) -> UnitResponses:
+        """The responses of the tool pose to single errors."""
+        return self.machine.unit_responses(self.q, self.state)
 
     @property
     def _turns(self) -> bool:
@@ -209,13 +216,18 @@ class Probing(Observation):
 
     def design(self, effects: Sequence[Effect]) -> Array:
         """See `Observation`."""
-        tip = self.machine.design_columns(self.meant, self.state, effects)[:3]
+        tip = self.machine.design_columns(self.meant, self.state, effects, self._responses, rows=3)
         rows = np.empty((tip.shape[1], tip.shape[2], 3))
         for k in range(3):
             by_tip = [self.axes_by_tip[:, k, j] * tip[j] for j in range(3)]
             rows[:, :, k] = -(by_tip[0] + by_tip[1] + by_tip[2])
         design = rows.reshape(len(rows), 3 * len(self.measurement)).T
         return np.concatenate([design, np.zeros((len(self.distances), len(rows)))]) if self.distances else design
+
+    @cached_property
+    def _responses(self) -> UnitResponses:
+        """The responses of the tool pose to single errors."""
+        return self.machine.unit_responses(self.meant, self.state)
 
     def unknown_design(self, unknowns: Array) -> Array:
         """See `Observation`."""

@@ -54,6 +54,9 @@ TINY_UM = 1e-6
 TORN = "either the machine file or the readings are wrong; no file is written until it is known which"
 ALIAS_LOG_ODDS = 3.0
 """Log odds (20 to 1) within which another mistake explains the data as well."""
+HOPELESS = 100.0
+"""A mistake with log odds further below zero than this, and than what `AS_SIMPLE` forgives, is not fitted to the end:
+it is neither found nor listed beside one that is."""
 FIRST_SIGHT = 5.0
 """Mistakes with log odds below minus this, to first order, are not evaluated exactly."""
 
@@ -174,9 +177,14 @@ def _weight(left: float, stretch: float, now: Misfit) -> float:
 
 def _tried(mistake: Mistake, before: float, now: Misfit, count: int, held_um: float) -> Mistake:
     """The mistake with its residual after being undone, constants held within `held_um`, and its log odds."""
+    slack = HOPELESS + now.count * float(np.log(AS_SIMPLE))
+
+    def hopeless(least: float) -> bool:
+        return _odds(max(least, 0.0), before, mistake, undone, now, count) < -slack
+
     try:
         undone = misfit(mistake.measurements, mistake.machine)
-        left = undone.left(held_um)
+        left = undone.left(held_um, hopeless if mistake.gained is None else None)
     except (NcfixError, np.linalg.LinAlgError, ValueError):
         return replace(mistake, odds=-np.inf)
     paid, odds = _paid(mistake, now, count), _odds(left, before, mistake, undone, now, count)
