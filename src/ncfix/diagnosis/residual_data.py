@@ -231,18 +231,33 @@ class ResidualData:
 
     def size_by_view(self, values: Array, keep: Mask | None = None) -> Array:
         """`rms` over each sort of rows, (views,); zero for sorts without a row in `keep`."""
-        inside = self._inside if keep is None else self._inside & keep
         squares = (values**2).reshape(len(values), -1).sum(axis=1)
-        rows = np.unique(self.row[inside], return_index=True)[1] if keep is not None else self._firsts
-        count = self.views.max(initial=-1) + 1
-        total = np.bincount(self.views[inside], squares[inside], minlength=count)
-        return np.sqrt(total / np.maximum(np.bincount(self.views[inside][rows], minlength=count), 1))
+        if keep is None:
+            views, counts = self._sorted
+            squares = squares if self._whole else squares[self._inside]
+        else:
+            inside = self._inside & keep
+            views, squares = self.views[inside], squares[inside]
+            rows = np.unique(self.row[inside], return_index=True)[1]
+            counts = np.bincount(views[rows], minlength=self.views.max(initial=-1) + 1)
+        return np.sqrt(np.bincount(views, squares, minlength=len(counts)) / np.maximum(counts, 1))
 
     def rms(self, values: Array, keep: Mask | None = None) -> float:
         """Root mean square over rows of the length of each row's vector of values (m, ...), um, of those in `keep`."""
         inside = self._inside if keep is None else self._inside & keep
         rows = len(self._firsts) if keep is None else len(np.unique(self.row[inside]))
         return float(np.linalg.norm(values if inside.all() else values[inside]) / np.sqrt(max(rows, 1)))
+
+    @cached_property
+    def _whole(self) -> bool:
+        """Whether all values belong to rows."""
+        return bool(self._inside.all())
+
+    @cached_property
+    def _sorted(self) -> tuple[Ints, Ints]:
+        """The sort of each value of the rows, and the number of rows of each sort, (views,)."""
+        views = self.views[self._inside]
+        return views, np.bincount(views[self._firsts], minlength=self.views.max(initial=-1) + 1)
 
     @cached_property
     def _inside(self) -> Mask:
