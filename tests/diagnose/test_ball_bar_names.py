@@ -55,6 +55,15 @@ def test_drives_are_named_and_nothing_is_added(kind: str, tmp_path: Path) -> Non
     assert found.findings[0].effects == ()
 
 
+@pytest.mark.parametrize("hold_s", [0.1, 0.17, 0.3])
+def test_spikes_of_eight_micrometres_are_named_however_fast_they_fade(hold_s: float) -> None:
+    """Samples are 0.13 or 0.38 s apart: a decay that none of the forms comes near leaves half of a spike."""
+    rng, mill, machine = np.random.default_rng(5), ballbar.Mill(), loads(ballbar.MACHINE)
+    mill.spike[1], mill.hold_s = 0.0085, hold_s
+    found = diagnose([reads(ballbar.measured(mill, rng).encode(), machine)], machine)
+    assert found.findings[0].candidate.name == "reversal spikes Y"
+
+
 @pytest.mark.parametrize(("axis", "name", "play"), [(0, "backlash X", "EBX"), (1, "lateral play EXY", "EBY")])
 def test_play_at_one_height_is_first_that_of_a_shift(axis: int, name: str, play: str) -> None:
     """A tilt at reversal, with the shift that it brings where the lever is always the same, is named beside it."""

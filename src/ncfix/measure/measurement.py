@@ -21,7 +21,7 @@ DIGITS = 9
 """Decimals of mm, degree and rad in files: beyond the resolution of any instrument."""
 STATES = re.compile(
     r"time_s|load_kgm?|feed_mm_min|spindle_rpm|tool_length|spindle_deg|temp_[a-z0-9_]+"
-    r"|(?:spike|settling)_[a-z]|(?:speed|accel|slave)_[a-z]_[a-z]"
+    r"|(?:spike|sticking|settling)_[a-z]|(?:speed|accel|slave)_[a-z]_[a-z]"
 )
 """Names of optional numeric state columns, without directions of approach."""
 NOTES = ("instrument", "date", "origin", "operator", "note")

@@ -28,7 +28,7 @@ APART = 0.5
 """Largest median distance of consecutive rows of a path, as a share of the radius; others are single poses."""
 FLAT = 1e-3
 """An axis that moves by less than this share of the others stands still."""
-FADING_S = {"spike": 0.1, "settling": 0.4}
+FADING_S = {"spike": 0.1, "sticking": 0.2, "settling": 0.4}
 """Prefix of a column -> time constant, s, of the decay of friction errors after a reversal."""
 
 
@@ -38,7 +38,7 @@ def with_motion(measurement: Measurement, machine: Machine) -> Measurement:
     - speed_x_y: velocity of X, mm/s, on circles in XY; zero on others;
     - accel_x_y: acceleration of X, mm/s^2;
     - slave_x_y: speed_x_y where Y is faster, else zero;
-    - spike_x, settling_x: direction of motion of X, decaying with the time since its reversal;
+    - spike_x, sticking_x, settling_x: direction of motion of X, decaying with the time since its reversal;
     - dir_X: direction of motion of X, unless the file states it.
     """
     if measurement.kind != "length" or not {*CENTRE, "feed_mm_min"} <= set(measurement.columns):
@@ -126,7 +126,7 @@ def _spikes(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
     for word in FADING_S:
         effects.append(Effect(name, (), Polynomial(degree=(1,)), input=f"{word}_{low}"))
         effects.append(Effect(name, (), Polynomial(degree=(1,)), input=f"{word}_{low}", **measured.factor(axis)))
-    loadings = tuple(np.eye(4)[:, 2 * k : 2 * k + 2] * [1.0, GROWING] for k in range(len(FADING_S)))
+    loadings = tuple(np.eye(len(effects))[:, 2 * k : 2 * k + 2] * [1.0, GROWING] for k in range(len(FADING_S)))
     title = f"reversal spikes of {axis.name}: it sticks for a moment where it reverses"
     remedy = "adjust the friction compensation (quadrant) of the drive; lubricate"
     needs = tuple(f"{word}_{low}" for word in FADING_S)
