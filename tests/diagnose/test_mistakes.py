@@ -12,7 +12,7 @@ from conftest import FULL, some
 from measure.poses import machine, plan
 from ncfix.diagnosis.diagnosis import diagnose
 from ncfix.diagnosis.mistakes.search import find
-from ncfix.diagnosis.residual_data import is_free
+from ncfix.diagnosis.residual_data import is_free, misfit
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Polynomial
 from ncfix.machine.piecewise import PiecewiseLinear
@@ -99,7 +99,7 @@ CASES: dict[str, Callable[[Measurement, Machine], Changed]] = {
     "inch": lambda d, m: (columns(d, 1 / 25.4, "X", "Y", "Z"), m),
     "metre": lambda d, m: (columns(d, 1e-3, "X", "Y", "Z"), m),
     "um": lambda d, m: (columns(d, 1e3, "X", "Y", "Z"), m),
-    "degree": lambda d, m: (columns(d, np.pi / 180, "B", "C"), m),
+    "radian": lambda d, m: (columns(d, np.pi / 180, "B", "C"), m),
     "axis sign X": lambda d, m: (columns(d, -1.0, "X"), m),
     "rotary sign B": lambda d, m: (d, turned(m, "B")),
     "tool length": lambda d, m: (d.with_columns({"tool_length": 320.0 - d.columns["tool_length"]}), m),
@@ -137,6 +137,15 @@ def test_a_mistake_is_found_by_its_odds(kind: str, data: Measurement, known: Mac
     assert wrong.after_um < 0.6 * wrong.before_um
 
 
+@pytest.mark.parametrize("kind", ["inch", "um", "swapped X Y", "axis sign X", "rotary sign B", "table active"])
+def test_a_fit_is_given_up_only_if_its_end_is_hopeless(kind: str, data: Measurement, known: Machine) -> None:
+    files, of = CASES[kind](data, known)
+    end = misfit([files], of).left()
+    for limit in (0.5 * end, 0.9 * end, 1.1 * end, 2 * end):
+        left = misfit([files], of).left(hopeless=lambda least, most=limit: least > most)  # type: ignore[misc]
+        assert left == end or (left == np.inf and end > limit)
+
+
 @pytest.mark.parametrize("kind", ["unit of values: inch", "inch"])
 def test_a_unit_is_no_squareness_that_moved(kind: str) -> None:
     """Where a file has squarenesses alone, other ones explain a wrong unit to the last digit, and so does a table."""
@@ -154,7 +163,7 @@ def test_a_unit_is_no_squareness_that_moved(kind: str) -> None:
     assert "inch" in wrong.title
 
 
-UNITS = [kind for kind in CASES if kind.split(":")[0] in ("unit of values", "inch", "metre", "um", "degree")]
+UNITS = [kind for kind in CASES if kind.split(":")[0] in ("unit of values", "inch", "metre", "um", "radian")]
 
 
 SEVERAL = [(kind, repeated) for repeated in (False, True) for kind in [*UNITS, "tool length: m"]]

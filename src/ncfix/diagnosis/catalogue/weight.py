@@ -258,12 +258,11 @@ def _twist(measured: MeasuredRange, axis: Axis) -> Iterator[Candidate]:
     if own is None or not others:
         return
     name = f"E{TURNS[own]}{axis.name}"
-    loaded = "load_kg" in measured.columns
     effects = zero([Effect(name, (), Fourier(order=(1,)), **measured.factor(other)) for other in others])
     title = f"trunnion twist of {axis.name}: driven from one side, the angle lags along the axis"
     yield Candidate(
         f"trunnion twist {axis.name}", title, axis.name, f"{axis.name} weight", effects,
-        (weighed((1.0,) * 2 * len(effects)),), ("load_kg",) if loaded else (), "drive from both sides",
+        (weighed((1.0,) * 2 * len(effects)),), (), "drive from both sides",
     )  # fmt: skip
 
 

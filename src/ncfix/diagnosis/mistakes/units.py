@@ -157,7 +157,7 @@ def units(measurements: tuple[Measurement, ...], machine: Machine) -> Iterator[M
     if rotary and max(float(np.abs(each.column(a)).max()) for each in measurements for a in rotary) < TURN_RAD:
         title = "radian: angles in the measurement are in radians instead of degrees"
         changed = tuple(each.times(rotary, 180 / np.pi) for each in measurements)
-        yield Mistake("degree", title, "", machine, changed)
+        yield Mistake("radian", title, "", machine, changed)
     for index, effect in enumerate(machine.effects):
         if looks_typed(effect):
             title = f"degree: {effect.name} of the machine file was typed in degrees instead of radians"
