@@ -56,15 +56,16 @@ FANUC = Dialect(
     ),
     passes=(
         "G53, G27, G28, G30, G31, the turn of G53.1, dwell (G4), G5.1, G8, G61 ... G64, tool change, other M codes",
-        "calls of programs that are in the control (O8000 to O9999: of a probe's maker or the machine's builder)",
+        "calls of programs in the control (O8000 to O9999: of the probe's or the machine's builder)",
     ),
     refuses=(
         "G68.3, G68.4, G68.2 P4, G54.2, G54.4, G12.1 while in force, threads, lines by their angle (,A)",
         "arcs and rotary words under G43.5, and its Q",
-        "G29, and pockets and texts that the control mills by itself (Haas: G47, G150)",
-        "a block that names one axis of the plane only, the first after G68 or G69",
-        "what is computed from positions (#5001 ...), inputs and clocks: compensation or the machine changes it",
-        "everything after a G code, a command or a setting (G10 L50, #5201) that is not known",
+        "G29, and pockets and texts that the control mills with one code (Haas: G47, G150)",
+        "the first block after G68 or G69, if it names only one axis of the plane",
+        "motions that depend on positions (#5001 ...), inputs or clocks: the correction or the machine changes these "
+        "values",
+        "everything after an unknown G code, command or setting (G10 L50, #5201)",
         "blocks executed from several states, and canned cycles with G91, without --flatten",
         "programs for lathes: turning cycles (G71 P Q), G50 S, or G96 and no Y",
     ),

@@ -23,7 +23,7 @@ HEIDENHAIN = Dialect(
     foreign=(
         ("a text without BEGIN PGM", rb"(?is)\A(?!.*\bBEGIN[ \t]+PGM\b)"),
         (
-            "Klartext with an N before each block number, which has to be taken out",
+            "Klartext with an N before each block number, which must be removed",
             rb"(?im)^[ \t]*/?[ \t]*(N\d+[ \t]+(?:L|CC|TOOL|CYCL|BEGIN|BLK)\b)",
         ),
     ),
@@ -32,7 +32,8 @@ HEIDENHAIN = Dialect(
     closure_relative=0.0,
     feed_of="all",
     understands=(
-        "L, LN, LP, CC with C, CR, CP (helices too), CT, CTP, words alone; absolute, incremental and polar words",
+        "L, LN, LP, CC with C, CR, CP (helices too), CT, CTP, blocks of words without L; absolute, incremental and "
+        "polar words",
         "R0 RL RR, APPR and DEP, RND and CHF: the contour is corrected, the control offsets and rounds it",
         "FMAX, F, decimal points and commas, `~`, block numbers of any kind, MM and INCH",
         "presets (CYCL DEF 247), datum shift (7, TRANS DATUM), mirror (8), rotation (10), scale (11), tool lengths",
@@ -40,23 +41,24 @@ HEIDENHAIN = Dialect(
         "PLANE SPATIAL, PROJECTED, EULER, VECTOR, POINTS, RELATIV, AXIAL, RESET with STAY, TURN, MOVE, and cycle 19",
         "M128, M129, FUNCTION TCPM; LN with TX TY TZ; M126 and M127",
         "drilling cycles 1, 2, 17, 18, 200-203, 205-209, 240, 241 with M99, M89, CYCL CALL POS",
-        "pockets, slots, studs, threads (251-253, 256-258, 262-265, 267): their place and bottom, as a whole",
-        "Q parameters, formulas, FN 0 ... FN 13, LBL, CALL LBL with REP, jumps; CALL PGM is followed",
+        "pockets, slots, studs, threads (251-253, 256-258, 262-265, 267): their position and bottom, as a whole",
+        "Q parameters, formulas, FN 0 ... FN 13, LBL, CALL LBL with REP, jumps; CALL PGM",
     ),
     passes=(
         "M91 and M92, M140, TCH PROBE, the turn of PLANE ... TURN, DEP without an end, rapids after these",
         "rotary axes that are positioned in a tilted plane, TOOL CALL, BLK FORM, other M codes",
     ),
     refuses=(
-        "other cycles with a path of their own, called programs (they are not rewritten)",
+        "other cycles with a path of their own, motions in called programs (ncfix does not rewrite them)",
         "free contours (FK): --flatten writes those that have one solution as lines and arcs",
         "patterns (PATTERN DEF with CYCL CALL PAT, cycles 220, 221) without --flatten, which writes their holes out",
         "tables of datums, TCPM with spatial angles or another point than the tip, M114, M138, M144",
         "rotary axes with a datum of their own under M128 or PLANE; increments of more than half a turn under M126",
-        "what follows a probing cycle that sets a datum or a rotation, until a preset is chosen",
-        "a shift in a rotated frame, mirror with rotation, a scale of single axes: how they add up is not sure",
-        "what depends on Q parameters that the control sets, blocks executed from several states",
-        "a line that is no Klartext: the control stops there; one that is not understood, by what may be in it",
+        "motions after a probing cycle that sets a datum or a rotation, until the program selects a preset",
+        "a shift in a rotated frame, mirror with rotation, a scale of single axes: how the control combines them is "
+        "not certain",
+        "motions that depend on Q parameters that the control sets, blocks executed from several states",
+        "a line that is not Klartext, where the control stops; an unknown line, by what it may contain",
     ),
     language="ncfix_heidenhain.klartext.language:KLARTEXT",
 )

@@ -24,8 +24,8 @@ ISO = Dialect(
     semantics="iso",
     returns=rb"(?i)M[ \t]*0*99(?!\d)",
     refuses=(
-        "G16, G51, G51.1, G12.1, G68.2 while in force, threads, incremental canned cycles without --flatten",
-        "everything after a G code that is not known, or a G10 that sets other things on other controls (L10, L20)",
+        "G16, G51, G51.1, G12.1, G68.2 while in force, threads, canned cycles with G91 without --flatten",
+        "everything after an unknown G code, or after a G10 whose meaning depends on the control (L10, L20)",
         "blocks executed from several states without --flatten",
         "programs for lathes: turning cycles, G50 S, or G96 and no Y",
     ),

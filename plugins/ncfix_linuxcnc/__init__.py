@@ -35,8 +35,8 @@ LINUXCNC = Dialect(
     ),
     passes=("G53, G28, G30, probing (G38.x), dwell, tool change and other M codes",),
     refuses=(
-        "splines (G5), threads (G33, G76), turning cycles, incremental canned cycles without --flatten",
-        "what depends on probed or other run-time values, blocks executed from several states without --flatten",
+        "splines (G5), threads (G33, G76), turning cycles, canned cycles with G91 without --flatten",
+        "motions that depend on probed or other run-time values, blocks executed from several states without --flatten",
     ),
     feed_of="linear",
 )

@@ -25,7 +25,7 @@ SIEMENS = Dialect(
         *((family, pattern) for family, pattern in FOREIGN if family.startswith("Heidenhain")),
         ("Fanuc-like code (--dialect fanuc)", rb"\A\s*%[ \t]*\r?\n\s*O\d+"),
         (
-            "a program that goes over to SINUMERIK's ISO language (G291)",
+            "a program that changes to SINUMERIK's ISO language (G291)",
             rb"(?im)^[^(;\"\n]*(?<![A-Z])(G[ \t]*291)(?!\d)",
         ),
     ),
@@ -38,11 +38,12 @@ SIEMENS = Dialect(
         "G0 G1 G2 G3 with I J K, CR=, AR=, TURN=; CIP, CT; G90 G91, G70 G71 G700 G710, DIAMON DIAM90",
         "IF WHILE FOR LOOP REPEAT CASE GOTO, labels, PROC with parameters, subprograms in the text or beside it, also "
         "by CALL and EXTCALL",
-        "G54 ... G599, G500, TRANS ROT MIRROR and what is added to them, SCALE alike in all axes, G58 G59",
+        "G54 ... G599, G500, TRANS ROT MIRROR and their additive forms, SCALE equal in all axes, G58 G59",
         "TRAORI with rotary words, A3= B3= C3= or A2= B2= C2= (--strategy full corrects the direction)",
         "CYCLE800 axis by axis, by solid or projected angles",
-        "CYCLE81 ... CYCLE89, CYCLE840 where the axes stand or by MCALL",
-        "pockets, slots, studs, faces, milled threads (POCKET3, CYCLE61, ...) at their place or by MCALL, as a whole",
+        "CYCLE81 ... CYCLE89, CYCLE840 at the present position or by MCALL",
+        "pockets, slots, studs, faces, milled threads (POCKET3, CYCLE61, ...) at their position or by MCALL, as a "
+        "whole",
         "polar AP= RP= with G110 ... G112, lines and arcs about the pole",
         "G41 G42 and CUT3D with surface normals: the programmed contour is corrected, the control offsets it",
     ),
@@ -51,13 +52,14 @@ SIEMENS = Dialect(
         "other M codes, feed and path modes (G64x, CYCLE832, COMPCAD, FFWON, SOFT ...)",
     ),
     refuses=(
-        "what depends on values known at run time only: global data, $ variables, parameters of a PROC by itself",
+        "motions that depend on values known only at run time: global data, $ variables, parameters of a PROC that is "
+        "corrected by itself",
         "splines, POLY, threads, soft approach, POS and POSA, TRANSMIT, TRACYL, TOROT, coupled axes, fixed stops, axes "
         "and G codes named by variables",
         "LEAD and TILT, ORIPATH, directions under ORIMKS in turned frames; CYCLE800 by rotary axes, or without turning",
         "increments after a frame or tool length has changed; programmed frames over TRAORI; DIAM90 with increments",
-        "contours (CYCLE63, CYCLE72), and patterns of holes but HOLES1, HOLES2, CYCLE802 with --flatten",
-        "everything after a block or synchronized action that is not understood",
+        "contours (CYCLE63, CYCLE72), and patterns of holes except HOLES1, HOLES2, CYCLE802 with --flatten",
+        "everything after an unknown block or a synchronized action",
         "blocks executed from several states, without --flatten",
     ),
     language="ncfix_siemens.sinumerik.language:SINUMERIK",

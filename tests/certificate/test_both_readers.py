@@ -67,7 +67,7 @@ CASES = {
     "a work offset with block delete, and rotary axes": Shop(
         "iso", "table", "G21 G90 G17 G54\nG0 X-61 Y-22 Z41 A-65 C52\n/G55\nX6 Y-48 Z0\nG1 X40 C-43. F200\nM2\n", 3
     ),
-    "another tool in turned coordinates, whose length is not turned": Shop(
+    "another tool in rotated coordinates, whose length is not turned": Shop(
         "siemens",
         "table",
         "G17 G71 G90\nT1 D1 M6\nG54\nG0 X0 Y0 Z60 A0 C0\nAROT X32 Z12\nT2 D1 M6\nG0 X0 Y0 Z60\nG1 X40 Z50 F500\nM30\n",
@@ -125,8 +125,8 @@ def test_corrections_within_the_limits_of_the_machine() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
-        (b"F500", b"F501", "words that are no axes have changed"),
-        (b"F2.", b"F2.1", "the pieces take another time than the block"),
+        (b"F500", b"F501", "words other than axis words have changed"),
+        (b"F2.", b"F2.1", "the pieces have another duration than the block"),
     ],
 )
 def test_feeds_are_those_of_the_original(old: bytes, new: bytes, fault: str) -> None:
@@ -149,7 +149,7 @@ DIGITS = {
         "L X-16.3434 Y+8.8125 FMAX\nL Z+40.0000 FMAX\nL Z+39.3173 F1000\n"
         "CC X-19.6132 Y+20.7746\nC X-31.8124 Y+18.5467 DR-\n",
     ),
-    "finer digits in turned coordinates": (
+    "finer digits in rotated coordinates": (
         "three",
         FixOptions(figures=False, strategy="position", tolerance_um=5.0),
         "heidenhain",

@@ -133,4 +133,4 @@ def test_a_fault_in_a_loop_is_found(language: str) -> None:
 def test_a_motion_that_is_another_one_each_time_is_not_proved() -> None:
     found = proved("heidenhain", "LBL 1|L IX+1 F500|CALL LBL 1 REP 6|M30|END PGM A MM")
     assert found.faults == []
-    assert found.reasons["a motion that is made in more ways than this reader looks at"] == 1
+    assert found.reasons["a motion with more possible paths than the second reader checks"] == 1

@@ -102,7 +102,7 @@ def test_a_corrected_program_without_its_stamp_is_a_fault(root: Path) -> None:
     assert bare != text
     assert not prove(text, done.text, mill, given, "linuxcnc").faults
     assert [fault.text for fault in prove(text, bare, mill, given, "linuxcnc").faults] == [
-        "the program has changed and carries no stamp"
+        "the program has changed but has no stamp"
     ]
 
 

@@ -37,7 +37,7 @@ def test_axes_with_play_that_have_not_moved_are_in_the_middle() -> None:
     lines = LINES[: LINES.index(b"G2 ")] + b"M30\n"
     known = proof_of(lines, "play", {"X": 0.0, "Y": 0.0, "Z": 200.0})
     assert known.faults == []
-    assert [*known.reasons] == ["the way of a motion, because of play"]  # where an axis turns round
+    assert [*known.reasons] == ["the path of a motion: backlash"]  # where an axis turns round
     assert proof_of(lines, "play", {}).faults == []
 
 
@@ -55,7 +55,7 @@ def test_an_axis_with_play_comes_out_of_a_hole_the_other_way_than_it_went_in() -
 
 def test_where_a_cycle_goes_back_to_is_not_guessed() -> None:
     text = b"G21 G90 G17\nG0 X0 Y0 Z20\n%sG81 X10 Y5 Z-4 R2 F100\nX20\nG80\nG1 X0\nM2\n"
-    assert proof_of(text % b"", "table", {}).reasons["where an axis stands is not known"] == 1
+    assert proof_of(text % b"", "table", {}).reasons["the position of an axis is not known"] == 1
     for code in (b"G98 ", b"G99 "):
         proof = proof_of(text % code, "table", {})
         assert (proof.faults, proof.unproved) == ([], 0)
@@ -131,11 +131,15 @@ def test_what_cam_systems_write_in_klartext_is_followed(words: dict[str, str]) -
 @pytest.mark.parametrize(
     ("line", "instead", "reason"),
     [
-        ("Q339=+1", "Q339=+Q5", "where an axis stands is not known"),
-        ("S8000", "S8000 DL+QL1", "a tool call without a tool or an oversize that this reader knows"),
-        ("S8000", "S8000 DL+0.1\nTOOL CALL S9000", "a tool call without a tool or an oversize that this reader knows"),
-        ("M120 LA20", "TOOL CALL DL+0.1", "another tool while the tip is led (M128, TCPM)"),
-        ("C+20 FQ1", "C+220 FQ1", "a rotary axis goes the shorter way (M126)"),
+        ("Q339=+1", "Q339=+Q5", "the position of an axis is not known"),
+        ("S8000", "S8000 DL+QL1", "a tool call without a tool or an oversize that the second reader knows"),
+        (
+            "S8000",
+            "S8000 DL+0.1\nTOOL CALL S9000",
+            "a tool call without a tool or an oversize that the second reader knows",
+        ),
+        ("M120 LA20", "TOOL CALL DL+0.1", "another tool under tool-centre-point control (M128, TCPM)"),
+        ("C+20 FQ1", "C+220 FQ1", "a rotary axis takes the shorter path (M126)"),
     ],
 )
 def test_what_is_not_followed_in_klartext_is_not_proved(line: str, instead: str, reason: str) -> None:
@@ -149,7 +153,7 @@ def test_what_is_not_followed_in_klartext_is_not_proved(line: str, instead: str,
 def test_a_tool_that_turns_in_a_plane_is_proved_where_it_does_not_turn_and_at_the_ends() -> None:
     text = KLARTEXT.format(on="FUNCTION TCPM F TCP AXIS POS PATHCTRL VECTOR", off="FUNCTION RESET TCPM")
     proof = klartext_proof(text)
-    ways = {"the way of a motion in which the tool turns in a plane (PATHCTRL VECTOR)": 2}
+    ways = {"the path of a motion in which the tool turns in a plane (PATHCTRL VECTOR)": 2}
     assert (proof.faults, dict(proof.reasons), proof.proved_motions) == ([], ways, 3)
     assert klartext_proof(text, ("A-14", "A-14.01")).faults
 
@@ -188,7 +192,7 @@ def test_what_posts_of_sinumerik_write_is_followed_and_half_turns_need_not_be_sp
     fixed = fix_program(read(text, "part", get("siemens")), known, setup, options).text
     given = Given(offsets={"G54": {}}, tools={1: 80.0}, initial=start, assume_zero=True)
     proof = prove(text, fixed, known, given, "siemens")
-    rolls = {"a rotary axis may go the other way round": 1} if c < -180 else {}
+    rolls = {"a rotary axis may turn in the other direction": 1} if c < -180 else {}
     assert (proof.faults, dict(proof.reasons), proof.motions) == ([], rolls, 6)
     assert prove(text, fixed.replace(b"Z=_Z_HOME", b"Z=_X_HOME", 1), known, given, "siemens").faults
 

@@ -35,7 +35,7 @@ FAMILIES = {
 
 RELATIVES = {"fanuc": ("haas",)}
 FOREIGN = frozenset({"NCF101", "NCF102", "NCF103"})
-BEYOND = "beyond the range over which its errors are known"
+BEYOND = "beyond the range in which its errors are known"
 SETUP = Setup(assume_zero=True, no_point="calculator")
 
 

@@ -59,7 +59,7 @@ WORDS = [
     case("words that belong to an M code", "L X+5 F100 M118 Z+1\nL Z+5", L4=R, L5=R),
     case("surface normals", "LN X+5 Y+6 Z+7 NX+0 NY+0 NZ+1 F100", L4=R),
     case(
-        "a direction of the tool on three axes",
+        "a tool direction on three axes",
         "LN X+5 Y+6 Z+7 TX+0 TY+0 TZ+1 F100 M128\nL X+1 Y+1 Z+1 FMAX M91",
         L4=N,
         L5=P,

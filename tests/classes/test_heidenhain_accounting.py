@@ -29,7 +29,7 @@ DEFINED = re.compile(rb"TOOL\s+DEF\s*(\d+)")
 LENGTH, RADIUS = 80.0, 8.0
 """mm, of tools that a program does not define itself: with tools of no length spindles would stand in the table."""
 
-STOPPING = ("the arc has no radius", "the arc does not close", "this line is not understood")
+STOPPING = ("the arc has no radius", "the arc does not close", "this line is unknown")
 """Why blocks are refused at which the control itself stops."""
 
 MOST, MOST_FLAT = 0.05, 0.01

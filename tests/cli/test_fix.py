@@ -200,7 +200,7 @@ def test_zeros_that_are_assumed_are_named_in_warnings_and_in_the_stamp(shop: Any
     shop.program.write_bytes(NEITHER_OFFSET_NOR_START)
     result = ncfix("fix", shop.program, "-m", shop.machine, "-o", "-", "--assume-zero")
     assert result.code == ExitCode.DONE
-    assert "NCF205: work offset G54 is not given and is taken as zero" in result.err
+    assert "NCF205: work offset G54 is not given; ncfix uses zero" in result.err
     assert b"G54" in result.out.splitlines()[0]
 
 
@@ -354,5 +354,5 @@ def test_simulate_and_verify_say_what_they_took_for_granted(
     given = ("-m", shop.machine, "--assume-zero", "--dialect", "iso")
     for arguments in (("simulate", "--program", shop.program), ("verify", shop.program, shop.program)):
         said = ncfix(*arguments, *given).err
-        assert said.count("NCF205: work offset G54 is not given and is taken as zero") == 1
+        assert said.count("NCF205: work offset G54 is not given; ncfix uses zero") == 1
         assert said.count(f"{shop.program}:63:1: NCF228: G777 is not known") == 1

@@ -113,4 +113,4 @@ def test_tools_of_a_table_whose_lengths_are_not_what_they_seem(ncfix: Any, tmp_p
     assert "NCF386: no tool is longer than 4 mm: is the table in inches?" in ncfix(*command).err
     table.write_text("T1 P1 X2 Z100\n")
     found = ncfix(*command).err
-    assert "NCF202: length of tool 1, which the tool table has at X2 as well, is used and not given" in found
+    assert "NCF202: length of tool 1, which the tool table has at X2 as well, is used but not given" in found

@@ -174,14 +174,12 @@ def test_what_is_left_is_said_with_lines_and_size() -> None:
         str(said.place.path if said.place else ""),
         said.place.line if said.place else 0,
     ) == ("NCF439", HINT, "part.nc", 4)
-    assert "X is left where it stands in this motion, which cuts, up to 2.35 um beside" in said.text
+    assert "X gets no word in this motion, which cuts, and is up to 2.35 um from" in said.text
     nothing = left().message("part.nc")
-    assert "this motion, which cuts nothing, up to" in nothing.text
+    assert "this motion, which cuts nothing, and is up to" in nothing.text
     assert nothing.hint == ""
     many = left("B", 7, 0, ((4, 4), (6, 9)), np.radians(0.25)).message("part.nc")
-    assert (
-        "B is left where it stands in 7 motions (lines 4, 6 to 9), none of which cut, up to 0.25 degrees" in many.text
-    )
+    assert "B gets no word in 7 motions (lines 4, 6 to 9), none of which cut, and is up to 0.25 degrees" in many.text
     more = left("X", 9, 2, [(row, row) for row in (1, 3, 5, 7, 9)]).message("part.nc")
     assert "9 motions (between lines 1 and 9), 2 of which cut" in more.text
     four = left("X", 9, 2, [(row, row) for row in (1, 3, 5, 7)]).message("part.nc")
@@ -191,8 +189,8 @@ def test_what_is_left_is_said_with_lines_and_size() -> None:
 def test_axes_left_in_the_same_motions_are_one_message() -> None:
     same = [left(axis, 2, 1, ((4, 4), (9, 9)), most) for axis, most in zip("XYZ", (0.001, 0.003, 0.002), strict=True)]
     said = [each.text for each in said_of([*same, left("B", 2, 1, ((4, 4), (9, 9))), left("Y")], "part.nc")]
-    assert [text.partition(" left")[0] for text in said] == ["X, Y and Z are", "B is", "Y is"]
-    assert "left where they stand in 2 motions (lines 4, 9), 1 of which cut, up to 3.00 um beside where they" in said[0]
+    assert [text.partition(" no word")[0] for text in said] == ["X, Y and Z get", "B gets", "Y gets"]
+    assert "get no word in 2 motions (lines 4, 9), 1 of which cut, and are up to 3.00 um from" in said[0]
 
 
 def test_what_is_left_as_plain_data() -> None:

@@ -21,7 +21,7 @@ def test_the_worst_place_is_named_beyond_it() -> None:
     (warning,) = report(5.346).with_what_is_left(1.0).warnings
     assert warning.code == "NCF416"
     assert warning.text == (
-        "5.35 um are left here at the tool tip, more than the tolerance of 1 um and the 0.50 um of the control's digits"
+        "a tip error of 5.35 um is left here, more than the tolerance of 1 um and the 0.50 um of the control's digits"
     )
     assert warning.place is not None
     assert (warning.place.path, warning.place.line) == ("part.nc", 7)

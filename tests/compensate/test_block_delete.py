@@ -150,7 +150,7 @@ def test_a_rapid_whose_own_words_differ_stays_as_it_is(machine: Machine) -> None
     done = fixed(text.format(""), machine)
     assert done.report.refused == ()
     assert b"\n/G55\nG0 X20 Y25 Z80\nG54\n" in done.text
-    assert done.report.passed_by_rule["rapid behind a block with /"] == 1
+    assert done.report.passed_by_rule["rapid after a block with /"] == 1
     refused = fixed(text.format("G1 X21\n"), machine).report.refused
     assert refused[0].code == "NCF451"
     assert refused[0].line == 5, "a cut begins there"
@@ -185,7 +185,7 @@ def test_a_position_in_which_the_control_stops_is_an_error_that_names_it(machine
     text = "G21 G90 G17\nG0 X0 Y0 Z0\n/G1 X10 Y0 F500\nG2 X20 Y10 I0 J10 F500\nM2\n"
     with pytest.raises(SourceError) as raised:
         fixed(text, machine)
-    assert "where blocks with /1 are skipped" in raised.value.messages[0].text
+    assert "if blocks with /1 are skipped" in raised.value.messages[0].text
     assert raised.value.messages[0].place is not None
     assert raised.value.messages[0].place.line == 4
 

@@ -116,7 +116,7 @@ def test_cuts_that_begin_on_a_side_nobody_knows_are_counted(
     program = read(f"{BEGINS}{cuts}M2\n".encode(), "part.ngc", "linuxcnc")
     report = fix_program(program, with_play("w X Y F Z t"), setup, FixOptions(tolerance_um=tolerance)).report
     found = [(each.place and each.place.line, each.text) for each in report.warnings if each.code == "NCF285"]
-    words = "{} where nobody knows on which side of its play X is: the tip may be up to {} um off there"
+    words = "{} while the side of the backlash of X is not known: the tip may be up to {} um off there"
     assert found == ([] if said is None else [(said[0], words.format(*said[1:]))])
 
 

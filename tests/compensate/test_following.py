@@ -135,7 +135,7 @@ def test_an_offset_below_zero_is_no_length_where_the_errors_depend_on_it(code: s
     """A distance by which the tool was touched off would turn the lever of the tool round."""
     program = read(b"G21 G90 G54\nT1 M6\n%b H1\nG0 X10. Y0. Z10.\nM30\n" % code.encode(), "a.nc", "fanuc")
     setup = Setup(assume_zero=True, tools={1: Tool(length)})
-    with pytest.raises(UsageError, match="does not say how long"):
+    with pytest.raises(UsageError, match="that is not the length of the tool"):
         follow(program, loads(ROTARY_TABLE + TILTING_GUIDE), setup)
     assert follow(program, loads(ROTARY_TABLE), setup).trace.moves.tool_length[-1] == -abs(length)
 

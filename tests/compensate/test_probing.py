@@ -75,7 +75,7 @@ def test_an_axis_that_has_gone_to_a_measured_place_gets_no_word_of_its_own() -> 
 def test_the_stamp_and_a_warning_say_so() -> None:
     done = fixed(LEVELLED)
     assert b", nominal probing, assumed zero: " in done.text.splitlines()[0]
-    assert any("probing counts" in warning.text for warning in done.report.warnings)
+    assert any("as the results of probing" in warning.text for warning in done.report.warnings)
 
 
 def test_figures_leave_out_what_the_machine_measures() -> None:

@@ -137,7 +137,7 @@ def test_several_processes_give_the_same_bytes(jobs: int, machine: Machine) -> N
 def test_a_fault_in_a_part_of_another_process_is_told(machine: Machine) -> None:
     source = program(5, 200, 0.0).replace(b"M30", b"G92 X1\nG1 X2 Y2 Z5 B0 C0\nX3\nX4\nM30")
     for jobs in (1, 2, 3):
-        with pytest.raises(NotInPartsError, match="machine stands"):
+        with pytest.raises(NotInPartsError, match="the position of the machine"):
             streamed(source, machine, 900, jobs=jobs)
         with pytest.raises(SourceError, match="NCF1"):
             streamed(program(5, 200, 0.0).replace(b"M30", b"G1 X?\nM30"), machine, 900, jobs=jobs)
@@ -212,7 +212,7 @@ def test_what_looks_at_the_whole_path_is_not_done_in_parts(machine: Machine) -> 
         streamed(source, machine, 300, replace(OPTIONS, strategy="full"))
     with pytest.raises(NotInPartsError):
         streamed(source.replace(b"(PART)", b"o1 sub\no1 endsub"), machine, 300)
-    with pytest.raises(NotInPartsError, match="machine stands"):
+    with pytest.raises(NotInPartsError, match="the position of the machine"):
         streamed(source.replace(b"M30", b"G92 X1\nG1 X2 Y2 Z5 B0 C0\nX3\nX4\nM30"), machine, 300)
 
 

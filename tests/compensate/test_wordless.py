@@ -168,7 +168,7 @@ def test_what_is_left_is_counted_and_told() -> None:
     (left,) = report.left
     assert (left.axis, left.motions, left.cuts, left.first, left.last) == ("Z", 2, 0, 2, 3)
     (warning,) = (each for each in report.warnings if each.code == "NCF439")
-    assert "Z is left where it stands in 2 motions (lines 2 to 3), none of which cut, up to" in warning.text
+    assert "Z gets no word in 2 motions (lines 2 to 3), none of which cut, and is up to" in warning.text
     (entry,) = report.as_dict()["left_where_it_stands"]  # type: ignore[misc]
     assert entry["max_um"] == pytest.approx(left.most * 1e3, abs=1e-4)
     assert report.error_after_um["max"] < 1.0  # type: ignore[operator]

@@ -13,7 +13,7 @@ from typing import Any
 from ncfix.cli.main import run
 
 LETTERS = "XYZABCUVW"
-SPLIT = re.compile(r"leaves the intended path by (?P<um>[\d.]+) um, and this motion must not be split")
+SPLIT = re.compile(r"is up to (?P<um>[\d.]+) um from the intended path, but this motion must not be split")
 DONE, FINDINGS, USAGE, UNREADABLE, REFUSED, FAULT = range(6)
 
 

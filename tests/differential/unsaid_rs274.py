@@ -1,6 +1,6 @@
 """Programs of LinuxCNC for `differential.unsaid`, and its interpreter as their second control.
 
-LinuxCNC has no tilted planes and no tool centre point control. What leads its axes elsewhere than the words say are the
+LinuxCNC has no tilted planes and no tool-centre-point control. What leads its axes elsewhere than the words say are the
 plane of arcs and cycles, turned work offsets (G10 L2 R), shifts (G92) and a table that is turned.
 """
 

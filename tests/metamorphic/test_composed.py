@@ -25,12 +25,12 @@ AUTHORS: dict[str, type[Author]] = {
 }
 REFUSALS = (
     "executed from several states",
-    "a refused arc that follows",
-    "never goes through them",
-    "time that takes is not known",
+    "a refused arc after it",
+    "axis words, which are never executed",
+    "the duration is not known",
     "the arc needs a pole of its own",
     "beyond its range",
-    "over which its errors are known",
+    "in which its errors are known",
 )
 """Documented: calls from several states without --flatten, turns alone in programs of two units, poles, travel."""
 
@@ -57,7 +57,7 @@ G1 AP=0 RP=10.123456 F500
 G1 X0 Y0 Z0
 M30
 """,
-    "a direction of the tool in a flat program": """%
+    "a tool direction in a flat program": """%
 O1
 G21 G90 G94 G54
 G0 X0 Y0 Z230. A20. C0

@@ -66,7 +66,7 @@ def test_signs_are_added_where_the_language_has_them(root: Path, page: ModuleTyp
 
 
 def test_it_cannot_be_written_out_flat(page: ModuleType) -> None:
-    with pytest.raises(RefusedError, match="G code, which this language is not"):
+    with pytest.raises(RefusedError, match="G code, but this language is not"):
         flatten(read(LINES.encode(), "part.rob", page.ROBIN), SETUP, ("X", "Y", "Z"), frozenset(), {})
 
 
@@ -78,5 +78,5 @@ def test_what_no_keyword_can_be(keywords: dict[str, str]) -> None:
 
 def test_languages_that_have_none() -> None:
     dialect: Dialect = family("heidenhain").derive("words", title="Words", keywords={"MOVE": "G1"})
-    with pytest.raises(PluginError, match="codes of this dialect"):
+    with pytest.raises(PluginError, match="codes of its own"):
         language_of(dialect, Language)

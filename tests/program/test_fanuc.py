@@ -125,7 +125,7 @@ def test_a_word_e_may_stand_close_to_the_one_before() -> None:
 
 
 @pytest.mark.parametrize(
-    ("dialect", "reason"), [("fanuc", "names no axis"), ("mitsubishi", "names no axis"), ("haas", "")]
+    ("dialect", "reason"), [("fanuc", "without axis words"), ("mitsubishi", "without axis words"), ("haas", "")]
 )
 def test_a_reference_point_for_no_axis_or_for_all(dialect: str, reason: str) -> None:
     found = reasons(follow("G0X1.Y1.Z1.\nG28\nG1X2.F100.\nG0X3.Y3.Z3.\nX4.", dialect=dialect))
@@ -299,21 +299,21 @@ def test_codes(text: str, expected: list[list[float]]) -> None:
         ("G68.2P2Q1X1.\nG0X1.", "tilted plane (G68.2)"),
         ("G68X0Y0Z0I0J0K1.R30.\nG0X1.", "tilted plane"),
         ("G43.5H1\nG0X1.I0J0K1.", "needs the kinematics of a machine"),
-        ("G43.5H1\nG2X1.R5.", "an arc or a cycle while the direction"),
-        ("G43.5H1Q2.\nG0X1.", "leans away from its vectors"),
+        ("G43.5H1\nG2X1.R5.", "an arc or a cycle is programmed while"),
+        ("G43.5H1Q2.\nG0X1.", "inclines the tool from its vector"),
         ("G68.2P2Q0X1.\nG0X1.", "tilted plane (G68.2)"),
-        ("G68.2P2Q1X0Y0Z0\nG0X1.", "the blocks that say how it lies are not all there"),
+        ("G68.2P2Q1X0Y0Z0\nG0X1.", "are not complete"),
         ("G68.2P3Q1I1.\nG68.2P3Q2I1.K1.\nG0X1.", "tilted plane (G68.2)"),
         ("G68.2P4I10.\nG0X1.", "tilted plane (G68.2)"),
         ("G254\nG0X1.", "not known"),
         ("G10L50\nG0X1.", "parameters of the control"),
         ("G0X0Y0\nG68X0Y0R90.\nG52X5.\nG0X1.Y1.", "what G52 does while coordinates are turned"),
-        ("G0X0Y0\nG68X0Y0R90.\nG55\nG0X1.Y1.\nG69\nX1.Y1.", "an origin that was moved in turned coordinates"),
+        ("G0X0Y0\nG68X0Y0R90.\nG55\nG0X1.Y1.\nG69\nX1.Y1.", "a shift of the origin in rotated coordinates"),
         ("G51.1X0\nG92X5.\nG0X1.Y1.", "what G92 does while coordinates are turned"),
         ("G68.2X0Y0Z0I0J0K30.\nG54.1P1\nG0X1.Y1.", "what G54.1 does while coordinates are turned"),
         ("G68X0Y0R90.\nG10L2P1X5.\nG0X1.Y1.", "what G10 does while coordinates are turned"),
-        ("G10L10P1Z5.\nG0X1.", "a tool is set by other words"),
-        ("G54.4P1\nG0X1.", "the setting error of the workpiece (G54.4)"),
+        ("G10L10P1Z5.\nG0X1.", "sets a tool with other words"),
+        ("G54.4P1\nG0X1.", "the workpiece setting error compensation (G54.4)"),
         ("G54.2P2\nG0X1.", "the dynamic offset of the rotary table (G54.2)"),
         ("G10L2P0X1.\nG0X1.", "external work offset"),
         ("G66.1P1\nM30\nO1\nM99", ""),
@@ -449,7 +449,7 @@ def test_a_way_that_is_chosen_by_p_is_not_guessed(root: Path, dialect: str, code
     trace = follow_on(read(text.encode(), "part", dialect), machine, setup).trace
     known = word in ("", "P0")
     assert (trace.moves.rule[-1] == Rule.CORRECT) == known
-    assert known or "which way P of" in trace.moves.reasons[trace.moves.reason[-1]]
+    assert known or "in which direction P of" in trace.moves.reasons[trace.moves.reason[-1]]
     assert ("NCF243" in [message.code for message in trace.messages]) == known
 
 

@@ -168,5 +168,5 @@ def test_what_other_programs_find_is_left_to_them_in_the_flat_program_too() -> N
 
 def test_what_other_programs_find_must_be_known() -> None:
     program = read(b"#500=#5041\n#1=3\nG0X#1\nM30\n", "part", "fanuc")
-    with pytest.raises(NcfixError, match="what #500 is set to is known only at run time"):
+    with pytest.raises(NcfixError, match="the value of #500 is known only at run time"):
         flatten(program, KNOWN, ("X", "Y", "Z"), frozenset(), STEPS)

@@ -143,8 +143,8 @@ STOPS = {
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("M98P7\nM30\n%\nO0007\nM99\n", "the program O7 stands behind the % at which the control stops reading"),
-        ("GOTO N100\nN100 M30", "GOTO takes the number of a block, without N"),
+        ("M98P7\nM30\n%\nO0007\nM99\n", "the program O7 is after the % at which the control stops reading"),
+        ("GOTO N100\nN100 M30", "GOTO needs the number of a block, without N"),
     ],
 )
 def test_where_the_control_stops_the_reason_is_named(text: str, said: str) -> None:
@@ -164,12 +164,12 @@ def test_where_the_control_stops(text: str) -> None:
     ("text", "reason"),
     [
         ("G0X1.\n#1=#5041\nG0X[#1+1.]", "known only at run time"),
-        ("IF[1EQ2]THEN\nG0X1.\nENDIF\nG0X2.", "blocks between THEN and ENDIF are not followed"),
-        ("IF[#1000EQ1]GOTO5\nG0X1.\nN5G0X2.", "which blocks are executed here is decided at run time"),
+        ("IF[1EQ2]THEN\nG0X1.\nENDIF\nG0X2.", "ncfix does not support several blocks between THEN and ENDIF"),
+        ("IF[#1000EQ1]GOTO5\nG0X1.\nN5G0X2.", "which blocks are executed from here on is known only at run time"),
         ("#1=#3012\nG0X#1", "known only at run time"),
         ("#5201=1.\nG0X1.", "the program sets #5201"),
         *((f"G0X#{word}", "known only at run time") for word in (4109, 4111, 4119, 4120)),  # F, H, S, T of before
-        ("#1=0.1+0.2\nIF[#1GT0.3]GOTO5\nN5G0X1.", "which blocks are executed here is decided at run time"),
+        ("#1=0.1+0.2\nIF[#1GT0.3]GOTO5\nN5G0X1.", "which blocks are executed from here on is known only at run time"),
     ],
 )
 def test_what_depends_on_the_machine_is_refused(text: str, reason: str) -> None:
@@ -184,7 +184,7 @@ def test_the_work_offset_in_force_is_in_the_group_that_it_has_with_the_maker(dia
 
 def test_a_group_that_another_maker_counts_otherwise_is_no_number() -> None:
     assert reasons(follow("G57\nG0X#4014", dialect="mitsubishi")) == [
-        "where the axis X stands is known only at run time"
+        "the position of the axis X is known only at run time"
     ]
 
 
@@ -197,7 +197,7 @@ def test_reading_a_position_is_said() -> None:
 @pytest.mark.parametrize("setting", ["#2=4.", "#[#3]=4.", "#2=4. #3=5"])
 def test_what_is_set_on_a_condition_of_the_machine_is_known_only_at_run_time(setting: str) -> None:
     found = follow(f"#2=3.\n#3=2\nIF[#1000EQ1]THEN{setting}\nG0Y1.\nX#2", dialect="fanuc")
-    assert reasons(found) == ["", "where the axis X stands is known only at run time"]
+    assert reasons(found) == ["", "the position of the axis X is known only at run time"]
 
 
 @pytest.mark.parametrize("setting", ["#3000=1(TOO HIGH)", "#1100=1"])
@@ -208,7 +208,7 @@ def test_alarms_and_signals_on_a_condition_of_the_machine_do_no_harm(setting: st
 @pytest.mark.parametrize("then", ["#5221=4.", "G0X3.", "#[#2000]=1"])
 def test_what_else_is_done_on_a_condition_of_the_machine_leaves_nothing_certain(then: str) -> None:
     found = follow(f"IF[#1000EQ1]THEN{then}\nG0Y1.", dialect="fanuc", no_point="calculator")
-    assert reasons(found)[-1] == "which blocks are executed here is decided at run time"
+    assert reasons(found)[-1] == "which blocks are executed from here on is known only at run time"
 
 
 def test_a_skipped_condition_sets_nothing() -> None:

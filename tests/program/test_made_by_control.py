@@ -105,7 +105,7 @@ def test_a_pattern_of_holes_is_written_out(dialect: str, line: str, places: list
     """As it stands it is refused, with the option that helps."""
     body = f"G0 X1. Y2.\n{CYCLE}\nN9 {line} M8 (HOLES)\nG80"
     (why,) = fixed(dialect, body).report.refused
-    assert "--flatten writes them out" in why.reason
+    assert "with --flatten ncfix writes them out" in why.reason
     text = fixed(dialect, body, flat=True, machine=shifted_machine(0.0)).text
     assert b"M8 (HOLES)" in text
     moves = follow(read(text, "part.nc", dialect), shifted_machine(), SETUP).trace.moves

@@ -9,7 +9,7 @@ from ncfix.control.interpreter import Interpreter
 from ncfix.control.moves import Rule
 from program.tracing import follow
 
-REFUSED = "nothing is known that the control would make of the word {} in this block"
+REFUSED = "ncfix does not know what the control does with the word {} in this block"
 HEADS = {
     "fanuc": "G21G17G90G40G49G80G94\nG54G0X0.Y0.Z10.\nG1F100.\n",
     "iso": "G21G17G90G40G49G80G94\nG54G0X0.Y0.Z10.\nG1F100.\n",
@@ -41,7 +41,7 @@ def test_a_word_that_leads_somewhere_is_never_passed_over(dialect: str, block: s
 def test_a_word_beside_g80_needs_a_motion_code(dialect: str, block: str) -> None:
     moves = follow(f"{HEADS[dialect]}{block}\nG1 X1. Y2.\nM30\n", dialect=dialect, assume_zero=True).moves
     refused = [moves.reasons[moves.reason[row]] for row in range(len(moves)) if moves.rule[row] == Rule.REFUSE]
-    assert refused[0].endswith("say G0 or G1 in the block")
+    assert refused[0].endswith("program G0 or G1 in the block")
     coded = follow(f"{HEADS[dialect]}{block.replace('G80', 'G0G80')}\nG1 X1. Y2.\nM30\n", dialect=dialect).moves
     assert (coded.rule != Rule.REFUSE).all()
 
@@ -50,7 +50,7 @@ def test_a_radius_without_an_end_is_refused_as_a_word_that_is_not_taken() -> Non
     text = f"{HEADS['siemens']}CR=25\nX1 Y2\nM30\n"
     moves = follow(text, dialect="siemens", assume_zero=True).moves
     refused = [moves.reasons[moves.reason[row]] for row in range(len(moves)) if moves.rule[row] == Rule.REFUSE]
-    assert refused[0].startswith("G1 takes no word CR")
+    assert refused[0].startswith("G1 does not allow the word CR")
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_settings_take_their_words(dialect: str, block: str) -> None:
     if dialect == "heidenhain":
         head, end = "BEGIN PGM T MM\n", "END PGM T MM"
     moves = follow(f"{head}{block}\n{end}\n", dialect=dialect, no_point="calculator", assume_zero=True).moves
-    assert not [reason for reason in moves.reasons if reason.startswith("nothing is known")]
+    assert not [reason for reason in moves.reasons if reason.startswith("ncfix does not know what")]
 
 
 @pytest.mark.parametrize("language", ["fanuc", "siemens", "heidenhain"])

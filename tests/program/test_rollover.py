@@ -117,4 +117,4 @@ def test_corrections_lead_below_zero_where_axes_go_on_counting(machine: Machine)
 def test_spirals_are_refused(words: str, machine: Machine) -> None:
     text = HEAD + f"G2 X20. Y0. Z-5. {words}\nG0 X0. Y0. Z50.\nM30\n"
     moves = follow(read(text.encode(), "part.nc", "fanuc"), machine, SETUP).trace.moves
-    assert "winds further" in moves.reasons[moves.reason[-2]]
+    assert "has more turns" in moves.reasons[moves.reason[-2]]

@@ -72,15 +72,15 @@ most_blocks = 0
     assert found == [
         (2, "NCF383", "ncfix: schema version 2, this ncfix reads 1", ""),
         (3, "NCF382", "work_ofsets: unknown key 'work_ofsets'", "did you mean 'work_offsets'?"),
-        (4, "NCF382", "work_offsets.G53: no work offset", "they are G54 ... G59.3, and G54.1P1 ..."),
+        (4, "NCF382", "work_offsets.G53: not a work offset", "they are G54 ... G59.3, and G54.1P1 ..."),
         (5, "NCF383", "work_offsets.G55: expected a table [work_offsets.G55], found 'X0'", ""),
-        (6, "NCF382", "tools.a: no tool number", ""),
+        (6, "NCF382", "tools.a: not a tool number", ""),
         (7, "NCF382", "tools.4.lenght: unknown key 'lenght'", "did you mean 'length'?"),
-        (8, "NCF382", "initial.Q: no axis letter", "they are X Y Z A B C U V W"),
+        (8, "NCF382", "initial.Q: not an axis letter", "they are X Y Z A B C U V W"),
         (9, "NCF383", "workpiece_offset: expected a list of 3 numbers, found a list of 2", ""),
-        (10, "NCF382", "references.G29: no reference point", "they are G28, G30 and M92"),
+        (10, "NCF382", "references.G29: not a reference point", "they are G28, G30 and M92"),
         (10, "NCF383", "references.G29.X: inf is not a finite number", ""),
-        (11, "NCF382", "variables.depth: no parameter", 'they are written "#100" or "#<name>"'),
+        (11, "NCF382", "variables.depth: not a parameter", 'they are written "#100" or "#<name>"'),
         (12, "NCF383", "tcp: expected true or false, found 1", ""),
         (13, "NCF383", "most_blocks: expected a whole number above zero, found 0", ""),
     ]
@@ -112,7 +112,7 @@ def test_a_work_offset_is_named_as_in_a_program(key: str) -> None:
 
 
 def test_the_same_work_offset_with_and_without_a_blank_is_there_twice() -> None:
-    with pytest.raises(ConfigError, match=r"G54\.1P5 is there twice"):
+    with pytest.raises(ConfigError, match=r"G54\.1P5 appears twice"):
         loads('[work_offsets]\n"G54.1 P5" = [1]\n"G54.1P5" = [1]\n')
 
 
@@ -282,7 +282,7 @@ def test_offsets_of_fanuc_among_settings_and_notes(tmp_path: Path, unit: str, sc
 def test_offsets_of_fanuc_without_a_wear(tmp_path: Path, kind: str) -> None:
     """The whole on a control without L10, and a wear beside it."""
     assert table(tmp_path, "OFFSET.TXT", f"%\nG10 {kind} P3 R80.\n%\n") == {3: Tool(80.0)}
-    with pytest.raises(ConfigError, match=r":3: NCF385: offset 3 has a wear \(L11\) and no length"):
+    with pytest.raises(ConfigError, match=r":3: NCF385: offset 3 has a wear \(L11\) but no length"):
         table(tmp_path, "OFFSET.TXT", f"%\nG10 L10 P1 R120.5\nG10 {kind} P3 R80.\n%\n")
 
 

@@ -41,4 +41,4 @@ def test_an_axis_that_was_moved_meanwhile_has_to_be_named(dialect: str, begin: s
     text = "\n".join([HEADS[dialect], begin, under, end, one, all_three, "END PGM A MM" if "CYCL" in begin else "M30"])
     found = trace(read(f"{text}\n".encode(), "a", dialect), Setup(assume_zero=True), tuple("XYZ"), frozenset())
     assert found.moves.rule[-3:].tolist() == [Rule.REFUSE, Rule.REFUSE, Rule.CORRECT]
-    assert found.moves.reasons[found.moves.reason[-2]].startswith("where the axis X stands after")
+    assert found.moves.reasons[found.moves.reason[-2]].startswith("the position of the axis X after")

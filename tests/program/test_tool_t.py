@@ -63,7 +63,7 @@ def test_newer_controls_describe_the_columns_above_their_names(tmp_path: Path, d
         ("BALL_D8          +120.5  ", "BALL_D8      +120.5  ", "not below the names"),
         ("5      BALL_D8          +120.5", "5 BALL +120.5", "'5 BALL' is not a tool number"),
         ("BALL_D8          +120.5", "BALL_D8\t+120.5", "not below the names"),
-        (".T MM", ".T", "does not say MM or INCH"),
+        (".T MM", ".T", "does not name the unit, MM or INCH"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, what: str) -> None:

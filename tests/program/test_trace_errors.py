@@ -30,11 +30,14 @@ GOLDEN = {
         " (2.0000 apart, 0.0283 allowed)\n    F1 G2 X10 I6 J0\n"
         "  hint: check the centre words, and whether they count from the start of the arc or from the zero point"
     ),
-    "X1": ("part.ngc:1: NCF221: axis words, and no motion code is in force\n    X1\n  hint: G0 or G1 is missing"),
-    "G1 X1": "part.ngc:1: NCF225: a motion at feed, and no feed (F) is set\n    G1 X1",
+    "X1": (
+        "part.ngc:1: NCF221: the block has axis words, but no motion code is in force\n    X1\n  hint: G0 or G1 is "
+        "missing"
+    ),
+    "G1 X1": "part.ngc:1: NCF225: a motion at feed rate, but no feed rate (F) is set\n    G1 X1",
     "G123 X1": (
-        "part.ngc:1:1: NCF227: G123 is not a code of LinuxCNC\n    G123 X1\n    ^\n"
-        "  hint: if the machine remaps it, ncfix cannot follow it"
+        "part.ngc:1:1: NCF227: G123 is not a code of LinuxCNC\n    G123 X1\n    ^\n  hint: if the machine remaps it, "
+        "ncfix cannot know what it does"
     ),
     "M77": "part.ngc:1:1: NCF229: M77 is not a code of LinuxCNC\n    M77\n    ^",
     "N1 G0 X1\nN2 o1 if [#<no>]": (
@@ -42,8 +45,8 @@ GOLDEN = {
         '  hint: if the control has it: variables."#<no>" in the setup file'
     ),
     "o<hole> call [1]": (
-        "part.ngc:1:1: NCF231: there is no subprogram o<hole>\n    o<hole> call [1]\n    ^\n"
-        "  hint: it is looked for further down, in files beside the program, and where --subprograms DIR says"
+        "part.ngc:1:1: NCF231: there is no subprogram o<hole>\n    o<hole> call [1]\n    ^\n  hint: ncfix searches "
+        "the rest of the file, the folder of the program and that of --subprograms DIR"
     ),
 }
 

@@ -14,7 +14,7 @@ from ncfix.diagnostics import SourceError
 from ncfix_iso.rs274 import parameters
 from program.tracing import follow, last, reasons
 
-AXIS = "where the axis {} stands is known only at run time"
+AXIS = "the position of the axis {} is known only at run time"
 
 
 def value_of(expression: str, before: str = "") -> float:
@@ -110,7 +110,7 @@ def test_comparisons_that_versions_of_linuxcnc_decide_otherwise_are_known_at_run
 def test_a_loop_that_sums_up_to_its_end_runs_once_more_since_2_9_1() -> None:
     """Seventy-five times 0.0005 are 0.037500000000000026."""
     found = follow("#1=0\no1 while [#1 le 0.0375]\nG0 X#1\n#1=[#1+0.0005]\no1 endwhile\nG0 Y1")
-    assert reasons(found) == [""] * 75 + ["which blocks are executed here is decided at run time"] * 2
+    assert reasons(found) == [""] * 75 + ["which blocks are executed from here on is known only at run time"] * 2
 
 
 @given(st.sampled_from(["eq", "ne", "gt", "ge", "lt", "le"]), numbers, numbers)
@@ -220,4 +220,4 @@ def test_the_setup_may_give_the_value_of_a_pin() -> None:
 
 def test_a_branch_that_a_pin_decides_is_decided_at_run_time() -> None:
     found = follow("G0 X1\no1 if [#<_hal[a.b]> GT 1]\nG0 X2\no1 endif\nG0 X3")
-    assert reasons(found) == ["", "which blocks are executed here is decided at run time"]
+    assert reasons(found) == ["", "which blocks are executed from here on is known only at run time"]

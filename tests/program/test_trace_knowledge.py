@@ -33,24 +33,24 @@ def rules(followed: Trace) -> list[int]:
 def test_everything_that_is_missing_is_named_at_once() -> None:
     found = lacking("T4 M6\nG43\nG0 X1 Y1\nG43 H12\nG55 G0 X2\nZ5")
     assert found == [
-        ("NCF202", "length of tool 4 is used and not given"),
-        ("NCF201", "work offset G54 is used and not given"),
-        ("NCF203", "start position of Z matters and not given"),
-        ("NCF202", "length of tool 12 is used and not given"),
-        ("NCF201", "work offset G55 is used and not given"),
+        ("NCF202", "length of tool 4 is used but not given"),
+        ("NCF201", "work offset G54 is used but not given"),
+        ("NCF203", "start position of Z matters but not given"),
+        ("NCF202", "length of tool 12 is used but not given"),
+        ("NCF201", "work offset G55 is used but not given"),
     ]
 
 
 def test_a_program_of_another_machine_is_not_followed_to_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(control, "BLOCKS_AFTER_MISSING_AXIS", 10)
     offset, axis = (
-        ("NCF201", "work offset {} is used and not given"),
+        ("NCF201", "work offset {} is used but not given"),
         "the program moves the axis A, and the machine has only X Y Z",
     )
     first = [
         ("NCF206", axis),
         (offset[0], offset[1].format("G54")),
-        ("NCF203", "start position of Z matters and not given"),
+        ("NCF203", "start position of Z matters but not given"),
     ]
     assert lacking("G0 X1 Y1 A2\n" + 9 * "X2\n" + "G55 X3\n") == [*first, (offset[0], offset[1].format("G55"))]
     assert lacking("G0 X1 Y1 A2\n" + 10 * "X2\n" + "G55 X3\n") == first
@@ -61,13 +61,13 @@ def test_each_comes_with_its_option_and_place() -> None:
         follow("G0 X1 Y1\nG43 H12 Z1", "XYZ", NOTHING)
     assert str(caught.value) == "\n".join(
         [
-            "part.ngc:1: NCF201: work offset G54 is used and not given",
+            "part.ngc:1: NCF201: work offset G54 is used but not given",
             "    G0 X1 Y1",
             "  hint: --offset G54=x,y,z or --assume-zero",
-            "part.ngc:1: NCF203: start position of Z matters and not given",
+            "part.ngc:1: NCF203: start position of Z matters but not given",
             "    G0 X1 Y1",
             "  hint: --initial Z=... or --assume-zero",
-            "part.ngc:2: NCF202: length of tool 12 is used and not given",
+            "part.ngc:2: NCF202: length of tool 12 is used but not given",
             "    G43 H12 Z1",
             "  hint: --tool 12=LENGTH or --assume-zero",
         ]
@@ -83,15 +83,15 @@ def test_a_rapid_to_all_axes_needs_no_start_position() -> None:
 
 def test_a_cut_needs_its_start_position() -> None:
     found = lacking("F1 G1 X1 Y2 Z3", work_offsets=G54)
-    assert found == [("NCF203", f"start position of {axis} matters and not given") for axis in "XYZ"]
+    assert found == [("NCF203", f"start position of {axis} matters but not given") for axis in "XYZ"]
     assert [text for _, text in lacking("F1 G2 X1 Y1 I1", work_offsets=G54)] == [
-        f"start position of {axis} matters and not given" for axis in "XYZ"
+        f"start position of {axis} matters but not given" for axis in "XYZ"
     ]
 
 
 def test_increments_need_their_start_position_and_no_offset() -> None:
     assert lacking("G91 G0 X1 Y1 Z1") == [
-        ("NCF203", f"start position of {axis} matters and not given") for axis in "XYZ"
+        ("NCF203", f"start position of {axis} matters but not given") for axis in "XYZ"
     ]
     followed = follow("G91 G0 X1", "XYZ", Setup(initial={"X": 5.0, "Y": 6.0, "Z": 7.0}))
     assert ends(followed) == [[6, 6, 7]]
@@ -106,16 +106,16 @@ def test_machine_coordinates_need_nothing() -> None:
 def test_an_offset_that_the_program_sets_is_given() -> None:
     followed = follow("G10 L2 P1 X1 Y2 Z3\nG0 X0 Y0 Z0", "XYZ", NOTHING)
     assert ends(followed) == [[1, 2, 3]]
-    assert lacking("G10 L2 P1 X1\nG0 X0 Y0 Z0") == [("NCF201", "work offset G54 is used and not given")]
+    assert lacking("G10 L2 P1 X1\nG0 X0 Y0 Z0") == [("NCF201", "work offset G54 is used but not given")]
 
 
 def test_a_parameter_that_holds_an_offset_is_asked_for() -> None:
-    assert lacking("#1=#5221") == [("NCF201", "work offset G54 is used and not given")]
+    assert lacking("#1=#5221") == [("NCF201", "work offset G54 is used but not given")]
     assert lacking("#1=#5161")[0][0] == "NCF204"
 
 
 def test_a_position_that_is_read_is_asked_for() -> None:
-    assert lacking("#1=#<_z>") == [("NCF203", "start position of Z matters and not given")]
+    assert lacking("#1=#<_z>") == [("NCF203", "start position of Z matters but not given")]
 
 
 def test_axes_that_the_machine_lacks_are_named_once() -> None:
@@ -164,7 +164,7 @@ def test_reference_points_that_are_not_given_leave_their_axes_unknown() -> None:
     setup = Setup(work_offsets=G54, initial=ZERO)
     followed = follow("G0 X1 Y1 Z1\nG28 Z5\nG0 X2\nG1 Y3 F1\nG0 Z4\nG1 X5", "XYZ", setup)
     assert rules(followed) == [Rule.CORRECT, Rule.PASS, Rule.PASS, Rule.PASS, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
-    assert reasons(followed)[3] == "where the axis Z stands after the reference point is approached is not given"
+    assert reasons(followed)[3] == "the position of the axis Z after the approach to the reference point is not given"
     assert np.isnan(followed.moves.end[3, 2])
     assert np.isnan(followed.moves.start[5, 2])
 
@@ -181,7 +181,7 @@ def test_a_rapid_that_says_nothing_of_axes_that_are_not_known_passes_and_counts_
 def test_after_probing_only_what_is_named_anew_is_known() -> None:
     followed = follow("F1 G38.2 Z-5\nG0 X1\nG91 G0 Z1\nG90 G0 Z5\nG1 X2")
     assert rules(followed) == [Rule.PASS, Rule.PASS, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
-    assert reasons(followed)[:2] == ["probing", "where the axis Z stands after probing is known only at run time"]
+    assert reasons(followed)[:2] == ["probing", "the position of the axis Z after probing is known only at run time"]
 
 
 @pytest.mark.parametrize("setting", ["G92 Z0", "G10 L20 P1 Z0", "G10 L2 P1 Z#5063"])
@@ -244,7 +244,7 @@ def test_coordinates_that_are_not_followed_are_refused_until_they_end(on: str, o
 
 @pytest.mark.parametrize("word", ["G10 L2 P0 X5", "G10 L2 X5", "G91 G10 L2 P1 X5"])
 def test_offsets_that_controls_set_in_different_ways_are_refused(word: str) -> None:
-    assert "G10 L2 sets differs from control to control" in reasons(follow(f"{word}\nG90 G0 X1", dialect="iso"))[-1]
+    assert "G10 L2 sets depends on the control" in reasons(follow(f"{word}\nG90 G0 X1", dialect="iso"))[-1]
 
 
 @pytest.mark.parametrize("word", ["G5 X5 Y5 I1 J1 P1 Q1", "G5.1 X5 Y5 I1 J1"])
@@ -286,24 +286,24 @@ def test_further_work_offsets() -> None:
     assert ends(followed) == [[11, 1, 1]]
     with pytest.raises(UsageError) as caught:
         follow("G54.1 P3\nG0 X1", dialect="iso")
-    assert caught.value.messages[0].text == "work offset G54.1P3 is used and not given"
+    assert caught.value.messages[0].text == "work offset G54.1P3 is used but not given"
 
 
 @pytest.mark.parametrize("setting", ["G10 L20 P1 X0", "G10 L10 P1 R50.", "G10 L1 P1 Z50.", "G10 L2 P1 R30."])
 def test_what_g10_sets_that_controls_take_otherwise_is_refused_in_iso(setting: str) -> None:
     found = follow(f"G0 X1. Y1. Z1.\n{setting}\nG0 X2.", dialect="iso")
-    assert "differs from control to control" in reasons(found)[-1]
+    assert "depends on the control" in reasons(found)[-1]
 
 
 def test_g10_l11_asks_for_the_fixture_offset_that_it_measures_from() -> None:
     with pytest.raises(UsageError) as caught:
         follow("G0 X1 Y1 Z1\nG10 L11 P1 Z5", work_offsets={"G54": ZERO})
-    assert caught.value.messages[0].text == "work offset G59.3 is used and not given"
+    assert caught.value.messages[0].text == "work offset G59.3 is used but not given"
 
 
 def test_a_length_from_an_offset_that_was_probed_is_known_at_run_time_only() -> None:
     text = "T1 M6\nG0 X0 Y0 Z5\nF10 G38.2 Z-10\nG10 L20 P1 Z0\nG53 G0 Z0\nG10 L10 P1 Z5\nG43 H1\nG55 G0 X1 Y1 Z1"
-    assert reasons(follow(text))[-1] == "the length of tool 1 is measured at run time"
+    assert reasons(follow(text))[-1] == "the program measures the length of tool 1 at run time"
 
 
 def test_a_code_of_the_builder_that_the_setup_declares_changes_nothing() -> None:

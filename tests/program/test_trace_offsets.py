@@ -257,7 +257,7 @@ def test_h_alone_is_doubtful_elsewhere_until_g43(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "reason"), [("G43.1 H1 Z5.", "along the turned tool"), ("G1 G41.1 F100", "turns an axis along the path")]
+    ("text", "reason"), [("G43.1 H1 Z5.", "along the tilted tool"), ("G1 G41.1 F100", "turns an axis along the path")]
 )
 def test_words_show_what_a_code_of_linuxcnc_means_elsewhere(text: str, reason: str) -> None:
     assert reason in reasons(follow(f"G0 X1\n{text}\nX2", dialect="iso", tools=NUMBERED))[-1]

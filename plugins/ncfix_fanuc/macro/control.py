@@ -109,7 +109,10 @@ class MacroControl(RS274Control):
         if self.setup.no_point in POINTLESS:
             turning = angle or (address in INDEX and self.rotary[INDEX[address]])
             return value * self.increments[1 if turning else 0]
-        text = f"{address}{value:g} has no decimal point, and whether it counts units or least increments is not given"
+        text = (
+            f"{address}{value:g} has no decimal point, and the setup does not say whether it counts units or least "
+            "increments"
+        )
         hint = "--no-point IS-B: X50 is 0.050 mm; --no-point calculator: X50 is 50 mm"
         self.knowledge.missing.setdefault(NO_POINT, Message(NO_POINT, text, self.place(), hint))
         return value

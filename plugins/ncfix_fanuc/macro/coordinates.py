@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 
 ON, OFF = 510, 500
-REASON = "scaling (G51) is in force; --flatten writes out what its words mean"
-TOGETHER = "what {} does while scaling (G51) is in force is not certain"
-ALIKE = "scaling (G51) is taken to act on X, Y and Z alike"
+REASON = "scaling (G51) is in force; with --flatten ncfix writes the scaled positions"
+TOGETHER = "the effect of {} while scaling (G51) is in force is not certain"
+ALIKE = "scaling (G51): ncfix assumes that it acts on X, Y and Z alike"
 AT_PEACE = frozenset((MOTION, PLANE, DISTANCE, FEED_MODE, CUTTER, CONTROL, RETRACT, SPINDLE_MODE))
 """Groups of codes that scaling does not affect."""
 MIRROR, MIRROR_OFF, HAAS_MIRROR = 511, 501, 1010
@@ -49,7 +49,7 @@ def switch_scaling(control: MacroControl, block: Block, code: int) -> None:
         unfollowed(control, block, code)
         return
     if control.scaling is not None or not is_certain(control, block):
-        control.unwritten = control.unwritten or "scaling (G51) is not followed here"
+        control.unwritten = control.unwritten or "ncfix does not support this form of scaling (G51)"
         control.scaling = None
         unfollowed(control, block, code)
         return
@@ -125,7 +125,7 @@ def mirror_about_zero(control: MacroControl, block: Block, code: int) -> None:
 def map_on_cylinder(control: MacroControl, block: Block, code: int) -> None:
     """G107 of Haas: on with axis words, off without any."""
     if block.axes:
-        control.suspend("cylinder", "an axis is led round a cylinder (G107), which ncfix does not follow")
+        control.suspend("cylinder", "cylindrical interpolation (G107) is in force, which ncfix does not support")
     elif control.resume("cylinder"):
         control.lose(control.axis_indices, AFTER_UNFOLLOWED)
 
@@ -146,10 +146,8 @@ def put_up(control: MacroControl) -> None:
     control.refresh()
 
 
-POLAR_REASON = "polar coordinates (G16) are in force; --flatten writes them in X and Y"
-ONE_ALONE = (
-    "the program has named only one of radius and angle since G16, and from where the other counts is not certain"
-)
+POLAR_REASON = "polar coordinates (G16) are in force; with --flatten ncfix writes them as X and Y"
+ONE_ALONE = "since G16 the program has given only one of radius and angle, and the value of the other is not certain"
 POLAR_ON = 160
 
 

@@ -42,14 +42,14 @@ MADE = {
     1500: "a pocket (G150)",
     290: "return from the reference point (G29)",
     720: "holes along a line (G72)",
-    2530: "the turn of the tool square to a feature coordinate system (G253)",
+    2530: "the turn of the tool normal to a feature coordinate system (G253)",
 }
 """Motions whose path the control generates."""
 SQUARE = 2530
 
 SETTING_ERRORS = {
-    542: "the dynamic offset of the rotary table (G54.2), whose data are in the control, is in force",
-    544: "the setting error of the workpiece (G54.4), whose data are in the control, is in force",
+    542: "the dynamic offset of the rotary table (G54.2) is in force; its data are in the control",
+    544: "the workpiece setting error compensation (G54.4) is in force; its data are in the control",
 }
 
 LENGTHS = (10,)
@@ -58,9 +58,12 @@ UNFOLLOWED = {
     50: "parameters of the control (G10 L50)",
     52: "parameters of the control (G10 L52)",
 }
-CHANGED = "the length of the tool is changed while it is in force (G10 L10, #11001), which acts sooner or later"
+CHANGED = (
+    "the program changes the tool length while it is in force (G10 L10, #11001); when the change acts depends on the "
+    "control"
+)
 CHECKED = Passing(Pass.REFERENCE_POINT, "reference point check (G27)")
-AFTER_ALL = "where the axis {} stands after G28 that names no axis differs from control to control"
+AFTER_ALL = "the position of the axis {} after G28 without axis words depends on the control"
 NO_LENGTH = 490
 TOOL_LIFE = 3
 RADIUS = 12
@@ -128,7 +131,7 @@ def set_data(control: MacroControl, block: Block, code: int) -> None:
         control.tools.resized.add(whole(block.get("P"), "P of G10"))
     elif kind not in HARMLESS:
         what = UNFOLLOWED.get(kind, f"data of the control (G10 L{kind})")
-        control.refuse_rest(f"the program sets {what}, which ncfix does not follow")
+        control.refuse_rest(f"the program sets {what}, which ncfix does not support")
 
 
 def is_data(plan: RS274Plan) -> bool:
@@ -184,7 +187,7 @@ def set_length(control: RS274Control, block: Block) -> None:
     """L10 Pn R: the length of tool offset n; in G91 it is added."""
     number = whole(block.get("P"), "P of G10")
     if "R" not in block.values:
-        control.refuse_rest("a tool is set by other words than R (G10 L10)")
+        control.refuse_rest("G10 L10 sets a tool with other words than R")
         return
     length = control.modal.unit * block.values["R"]
     if control.modal.incremental:

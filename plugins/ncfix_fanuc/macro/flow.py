@@ -32,14 +32,18 @@ from ncfix_iso.rs274.plans import FlowLine, RS274Unit, has_words
 
 LOCKED = range(8000, 10000)
 NOT_AT_HAND = "NCF246"
-AFTER = "where the axis {{}} stands after the program O{label}, which is not at hand, is not known"
-TAKEN = "the program O{label} is not at hand, and is taken to leave offsets, tool lengths and modal codes as they are"
+AFTER = "the position of the axis {{}} after the program O{label} is not known: ncfix does not have its text"
+TAKEN = (
+    "ncfix does not have the program O{label}, and assumes that it does not change offsets, tool lengths or modal codes"
+)
 
 
 def ran(control: MacroControl, label: str) -> None:
     """Apply the assumed effect of a program whose text is not given: positions are lost, offsets and modes stay."""
     control.warn(
-        NOT_AT_HAND, TAKEN.format(label=label), "check what it sets, or say where its file is: --subprograms DIR"
+        NOT_AT_HAND,
+        TAKEN.format(label=label),
+        "check what it sets, or give the folder of its file with --subprograms DIR",
     )
     control.lose(control.axis_indices, AFTER.format(label=label))
     control.places.lose(mask_of(control.axis_indices))
@@ -48,7 +52,7 @@ def ran(control: MacroControl, label: str) -> None:
 
 
 BAD_JUMP = "NCF242"
-OVER_BLOCKS = "blocks between THEN and ENDIF are not followed"
+OVER_BLOCKS = "ncfix does not support several blocks between THEN and ENDIF"
 
 ONCE = dict(
     zip(
@@ -64,7 +68,7 @@ SETS = 10
 
 LENGTHS = frozenset("ABCIJKQRUVWXYZ")
 """Arguments whose numbers count least increments of their address when they have no decimal point."""
-BEHIND_TAPE = "the program O{} stands behind the % at which the control stops reading"
+BEHIND_TAPE = "the program O{} is after the % at which the control stops reading"
 
 
 def local_variables(arguments: Iterable[tuple[str, Value]]) -> Store:
@@ -81,7 +85,7 @@ def local_variables(arguments: Iterable[tuple[str, Value]]) -> Store:
             last = position
             number = 3 * count + position
             if count > SETS:
-                raise Fault("NCF221", f"I, J and K may stand {SETS} times in a macro call")
+                raise Fault("NCF221", f"I, J and K may appear {SETS} times in a macro call")
         store[number] = Unknown(f"#{number}", value.nominal) if isinstance(value, Unknown) else value
     return store
 
@@ -287,7 +291,9 @@ class MacroFlow(ProgramFlow[RS274Unit]):
         for unit in (self.unit, self.main):
             at = self.outline_of(unit).programs.get(label)
             if at is not None and has_words(unit.plan(at)):
-                raise Fault(BAD_JUMP, f"words beside the number O{label} of a program that is called are not followed")
+                raise Fault(
+                    BAD_JUMP, f"ncfix does not support words in the block with the number O{label} of a called program"
+                )
             if at is not None:
                 return unit, at + 1
         file = self.find(label)
@@ -295,9 +301,9 @@ class MacroFlow(ProgramFlow[RS274Unit]):
             raise NotInPartsError("a subprogram may stand further down")
         if file is None:
             if re.search(rb"(?m)^[ \t]*[Oo:]0*%s(?!\d)" % label.encode(), self.main.program.source):
-                hint = f"take that % out, or put O{label} in a file of its own"
+                hint = f"remove that %, or put O{label} in a file of its own"
                 raise Fault(NO_SUBPROGRAM, BEHIND_TAPE.format(label), hint)
-            hint = "it is looked for in the file, in files beside it, and where --subprograms DIR says"
+            hint = "ncfix searches the file, its folder and that of --subprograms DIR"
             raise Fault(NO_SUBPROGRAM, f"there is no program O{label}", hint)
         outline = self.outline_of(file)
         first = outline.starts[0] if outline.starts else -1

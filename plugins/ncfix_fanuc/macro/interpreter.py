@@ -32,12 +32,12 @@ from ncfix_iso.rs274.settings import units
 G20, G21, G90, G91 = 200, 210, 900, 910
 G65, G66_1, G67 = 650, 661, 670
 SUBPROGRAM, LOCAL_SUBPROGRAM, RETURN = (980, 1980), 970, 990
-BY_ANGLE = "a line that is given by its angle (,A) is not followed"
-AFTER_ANGLE = "where the axis {} stands after a line that is given by its angle (,A) is not followed"
+BY_ANGLE = "ncfix does not support a line that is given by its angle (,A)"
+AFTER_ANGLE = "the position of the axis {} after a line that is given by its angle (,A) is not known"
 BEFORE_CALL = "GMFST"
 """Words that take effect before a macro is called if they stand before the call."""
-BESIDE_CALL = "a code before G65 is computed, so the program cannot be written out flat"
-MODAL_CALL = "G66 calls the program O{}, which is not at hand, so the program cannot be written out flat"
+BESIDE_CALL = "a code before G65 is calculated, so the program cannot be written out flat"
+MODAL_CALL = "G66 calls the program O{}, which ncfix does not have, so the program cannot be written out flat"
 COMPUTED_CALL = "the code of a macro call (G65, G66) is computed"
 NAME = re.compile(r"<(?P<angle>[^<>]+)>|\"(?P<quoted>[^\"]+)\"")
 
@@ -331,7 +331,7 @@ class MacroInterpreter(RS274Interpreter):
     def subprogram(self, block: Block) -> None:
         """M98 Pn Ln Qn; repeats may also precede the four digits of the program number; Q is the first block."""
         if "H" in block.values:
-            raise Fault(BAD_JUMP, "M98 with H means other things on other controls", "split the subprogram in two")
+            raise Fault(BAD_JUMP, "the meaning of M98 with H depends on the control", "divide the subprogram into two")
         name, times = self.named_program(), calls_of(block)
         if not name:
             number = whole(block.get("P"), "P of M98")
@@ -343,7 +343,7 @@ class MacroInterpreter(RS274Interpreter):
             self.watcher.write(f"M98 P{name}" if times == 1 else f"M98 P{name} L{times}")
         if "Q" in block.values:
             if times != 1:
-                raise Fault(BAD_JUMP, "where a repeated call begins that names a block (Q of M98) is not certain")
+                raise Fault(BAD_JUMP, "M98 with both L and Q: at which block the repeats begin is not certain")
             self.flow.jump(self.flow.numbered(whole(block.values["Q"], "Q of M98")))
 
     def is_there(self, label: str) -> bool:
@@ -405,7 +405,7 @@ class MacroInterpreter(RS274Interpreter):
                 self.watcher.write(before)
             return
         if code == G66_1:
-            self.control.refuse_rest("a macro is called by every block (G66.1)")
+            self.control.refuse_rest("every block calls a macro (G66.1)")
         self.modal_calls.append(ModalCall(label, times, store, len(self.flow.calls)))
 
     def arguments(self, plan: RS274Plan) -> Iterator[tuple[str, Value]]:

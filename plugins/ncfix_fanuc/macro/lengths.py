@@ -21,18 +21,21 @@ if TYPE_CHECKING:
     from ncfix_iso.rs274.control import Block
     from ncfix_iso.rs274.plans import Codes
 
-ALONG_Z = "a tool length in G18 or G19 is taken to act along Z"
+ALONG_Z = "a tool length in G18 or G19: ncfix assumes that it acts along Z"
 LENGTH_ALONE = "NCF214"
-ALONE = "a tool length without a Z word (G43, G49) is taken not to move the axis: up to the next Z word that matters"
-LENGTH_IN_STEPS = "where the axis {} stands after a tool length together with an increment (G91) is not certain"
+ALONE = (
+    "a tool length without a Z word (G43, G49): ncfix assumes that it does not move the axis, which matters up to the "
+    "next Z word"
+)
+LENGTH_IN_STEPS = "the position of the axis {} after a tool length together with an increment (G91) is not certain"
 NO_NUMBER = "NCF217"
-SPINDLE = "a tool length without H is taken as that of the tool in the spindle"
+SPINDLE = "a tool length without H: ncfix uses the length of the tool in the spindle"
 TURNED = "NCF218"
 TURNED_TEXT = (
-    "rotary axes stand turned where G43.4 is switched on; X Y Z are taken to ride on the workpiece as it lies with all"
-    " of them at zero (parameters 19696 WKP, 19754 RPS)"
+    "rotary axes are not at zero where G43.4 is switched on; ncfix assumes that X Y Z count in the workpiece as it "
+    "lies with all rotary axes at zero (parameters 19696 WKP, 19754 RPS)"
 )
-KIND_OF_TIP_CONTROL = "which tool-centre-point control P of G{:g} P{:g} selects is not known"
+KIND_OF_TIP_CONTROL = "which kind of tool-centre-point control G{:g} P{:g} selects is not known"
 BY_ANGLE, BY_VECTOR = 434, 435
 HAAS_TIP = 2340
 TIP_CONTROL = (BY_ANGLE, BY_VECTOR)
@@ -64,7 +67,7 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
         elif control.length_number is not None:
             block.values["H"] = float(control.length_number)
         else:
-            control.warn(NO_NUMBER, SPINDLE, "state H in the block of G43")
+            control.warn(NO_NUMBER, SPINDLE, "program H in the block of G43")
         if control.modal.plane.across != Z:
             control.warn(AXES_SAID, ALONG_Z, "check along which axis it acts (Fanuc: parameter 5001 TLB)")
         turned = any(abs(control.position[i]) > NOTHING for i in control.turning)
@@ -73,7 +76,7 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
             control.warn(TURNED, TURNED_TEXT, hint)
     settings.tool_offset(control, block, SAME.get(code, code))
     if control.tools.vector[Z] != before and "Z" not in block.values and not z_is_named_first(control):
-        control.warn(LENGTH_ALONE, ALONE, "state Z in the block, or check what the control does (parameter TOS)")
+        control.warn(LENGTH_ALONE, ALONE, "program Z in the block, or check what the control does (parameter TOS)")
 
 
 def direct(control: MacroControl, block: Block, code: int) -> None:

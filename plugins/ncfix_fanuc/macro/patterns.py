@@ -78,9 +78,9 @@ PATTERNS = {
 }
 EITHER_WAY, GRID = 340, 371
 G17, MOST = 170, 1000
-FLATTEN = "{}: the control works out where they are; --flatten writes them out"
+FLATTEN = "{}: the control calculates their positions; with --flatten ncfix writes them out"
 PATTERN = "pattern"
-AFTER_PATTERN = "where the axis {} stands after a pattern of holes is not followed"
+AFTER_PATTERN = "the position of the axis {} after a pattern of holes is not known"
 
 
 def pattern(control: RS274Control, block: Block, code: int) -> None:
@@ -118,6 +118,6 @@ def check_points(control: MacroControl, plan: RS274Plan, block: Block, code: int
         if value == 0.0 or control.setup.no_point == "calculator":
             continue
         if control.setup.no_point in POINTLESS:
-            text = f"{letter} of {PATTERNS[code].name} has no decimal point, and what it counts is not sure"
+            text = f"{letter} of {PATTERNS[code].name} has no decimal point, so its unit is not certain"
             raise Fault(NO_POINT, text, "give it a decimal point")
         control.without_point(letter, value)

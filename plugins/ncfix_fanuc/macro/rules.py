@@ -165,7 +165,7 @@ HAAS_MIRRORS, HAAS_CYLINDER = (1000, coordinates.HAAS_MIRROR), 1070
 """Mirror images about the zero point, G101 and G100, and G107, with which an axis goes round a cylinder."""
 
 HAAS_JUMPS = {
-    960: "which blocks are executed after M96 is for an input of the machine",
+    960: "which blocks are executed after M96 depends on an input of the machine",
     460: "which blocks are executed after M46 is for the pallet in the machine",
 }
 HAAS_END, HAAS_QUESTION = 1990, 1090

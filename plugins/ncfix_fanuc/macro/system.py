@@ -108,4 +108,4 @@ def was_set(control: MacroControl, number: int, value: Value) -> None:
     elif number in RADII:
         control.tools.resized.add(number - RADII.start + 1)
     elif not is_harmless(number):
-        control.refuse_rest(f"the program sets #{number}, which ncfix does not follow")
+        control.refuse_rest(f"the program sets #{number}, which ncfix does not support")

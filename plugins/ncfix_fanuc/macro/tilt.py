@@ -55,14 +55,14 @@ from ncfix_iso.rs274.systems import ENDS, rotate_system, turned_back, unfollowed
 STRAIGHT, ARCS = (0, 10), (20, 30)
 SPATIAL = (X, Y, Z)
 BAD_VECTOR = "NCF219"
-INCLINED = "the tool leans away from its vectors (Q of G43.5), which ncfix does not follow"
-BY_AXES = "a word of a rotary axis while the direction of the tool is given by I J K (G43.5)"
-ON_ARC = "an arc or a cycle while the direction of the tool is given by I J K (G43.5)"
-AT_RUNTIME = "the direction of the tool (I J K) is known only at run time"
-NO_KINEMATICS = "the direction of the tool (I J K) needs the kinematics of a machine with two rotary axes"
-FROM_UNKNOWN = "where the rotary axes stand before the tool is turned (I J K) is not known"
-AFTER_VECTOR = "where the axis {} stands after a direction of the tool that is not followed is not known"
-CHOICE = "state the direction in smaller steps, or use G43.4, if the control turns the other way"
+INCLINED = "Q of G43.5 inclines the tool from its vector, which ncfix does not support"
+BY_AXES = "a rotary axis is programmed while I J K give the tool direction (G43.5)"
+ON_ARC = "an arc or a cycle is programmed while I J K give the tool direction (G43.5)"
+AT_RUNTIME = "the tool direction (I J K) is known only at run time"
+NO_KINEMATICS = "the tool direction (I J K) needs the kinematics of a machine with two rotary axes"
+FROM_UNKNOWN = "the positions of the rotary axes before the tool turns (I J K) are not known"
+AFTER_VECTOR = "the position of the axis {} after a tool direction that is not supported is not known"
+CHOICE = "if the control turns the other way, program the direction in smaller steps or use G43.4"
 
 
 def directed(control: MacroControl, block: Block, motion: int) -> str:
@@ -84,7 +84,7 @@ def directed(control: MacroControl, block: Block, motion: int) -> str:
         return FROM_UNKNOWN
     found = control.postures(wanted(control, block), WayRules(in_travel=True))
     if found is None or not found.ways:
-        raise Fault(BAD_VECTOR, "the rotary axes cannot point the tool in this direction (I J K)")
+        raise Fault(BAD_VECTOR, "the rotary axes cannot turn the tool to this direction (I J K)")
     note_choice(control, found)
     for index, angle in found.chosen.items():
         block.values[LETTERS[index]] = (angle - control.offset[index]) / DEGREE
@@ -101,7 +101,7 @@ def wanted(control: MacroControl, block: Block) -> list[float]:
     turned = np.array([dot(row, [block.get(letter) for letter in COMPONENTS]) for row in control.rotation])
     size = float(np.linalg.norm(turned))
     if size == 0.0:
-        raise Fault(BAD_VECTOR, "the direction of the tool (I J K) has no length")
+        raise Fault(BAD_VECTOR, "the tool direction (I J K) is a vector of length zero")
     return [float(part) for part in turned / size]
 
 
@@ -112,7 +112,7 @@ def note_choice(control: MacroControl, found: Postures) -> None:
     here, (first, second) = found.here, found.ways
     by_one_axis = any(abs(second[k] - here[k]) < abs(first[k] - here[k]) for k in (0, 1))
     if found.leaves_pole or by_one_axis:
-        control.warn(TURNED_TO, f"G43.5 is taken to turn to {found}, the nearest of several ways", CHOICE)
+        control.warn(TURNED_TO, f"G43.5: ncfix assumes {found}, the nearest of several positions", CHOICE)
 
 
 TILT, CANCEL = 682, 690
@@ -123,7 +123,7 @@ ORDER = 123
 LAST = {POINTS: 3, VECTORS: 2}
 """Q of the last of the blocks that together say how the plane lies."""
 
-DEFINING = "a tilted plane (G68.2) is begun, and the blocks that say how it lies are not all there"
+DEFINING = "the blocks that define the tilted plane (G68.2) are not complete"
 BAD_PLANE = "NCF221"
 LEAST = 1e-6
 """Least length of vectors, and least sine of the angle between them, that define a plane."""
@@ -131,26 +131,30 @@ LEAST = 1e-6
 NEARLY_SQUARE = 2e-3
 """Largest deviation from a right angle, rad, of two vectors that are written with three decimals."""
 
-NOT_SOLVED = "where the axis {} stands after the tool was turned square to the plane is not known"
-WAY_BY_P = "which way P of {} turns the axis {} is for the control: name the rotary axes behind it"
+NOT_SOLVED = "the position of the axis {} after the turn of the tool normal to the plane is not known"
+WAY_BY_P = "in which direction P of {} turns the axis {} depends on the control: program the rotary axes after it"
 TURNED_TO = "NCF243"
-SQUARED = "the control's parameters decide; state the rotary axes in the program if they are others"
+SQUARED = "parameters of the control decide; if it uses other positions, program the rotary axes"
 ALIGNMENTS = {
     code: Passing(Pass.ALIGNMENT, f"tool axis alignment ({name})") for code, name in ((531, "G53.1"), (536, "G53.6"))
 }
 ABOUT_TIP = 536
 ROTARY_ALONE = Passing(
-    Pass.ROTARY_ALONE, "rotary axes are positioned in a tilted plane; the tip is corrected where it moves next"
+    Pass.ROTARY_ALONE, "rotary axes are positioned in a tilted plane; the tool tip is corrected in the next motion"
 )
 NO_TURN = 1e-9
 """rad; an axis that is told to go where it stands does not turn."""
-MIXED = "rotary axes move in a tilted plane together with others, without control of the tip (G43.4)"
-AFTER_MIXED = "where the axis {} stands after rotary and other axes have moved together in a tilted plane is not known"
-ASKEW = "the program has turned rotary axes in a tilted plane, and the tool does not stand square to it"
+MIXED = "rotary and linear axes move together in a tilted plane without tool-centre-point control (G43.4)"
+AFTER_MIXED = (
+    "the position of the axis {} after rotary and other axes have moved together in a tilted plane is not known"
+)
+ASKEW = "the program has turned rotary axes in a tilted plane, and the tool is not normal to it"
 DYNAMIC_ON, DYNAMIC_OFF = 2540, 2550
 DYNAMIC = "dynamic work offset"
-OFFSET_NOT_SOLVED = "how the tables stand where G254 comes into force, or what is in force besides it, is not followed"
-TABLES_MOVED = "a rotary axis moves while G254 is in force, which counts from where the tables stood"
+OFFSET_NOT_SOLVED = (
+    "G254 with table positions that are not known, or together with other transformations, is not supported"
+)
+TABLES_MOVED = "a rotary axis moves while G254 is in force, which depends on the table positions at its start"
 
 
 def tilt(control: MacroControl, block: Block, code: int) -> None:
@@ -213,7 +217,7 @@ def define(control: MacroControl, block: Block, form: int) -> None:
             return
         plane, turn = from_vectors(x, z, LEAST), 0.0
     if plane is None:
-        raise Fault(BAD_PLANE, "the points or vectors of the tilted plane (G68.2) do not say how it lies")
+        raise Fault(BAD_PLANE, "the points or vectors do not define the tilted plane (G68.2)")
     begin(control, product(plane, about(PLANES[170], turn)), given[1])
 
 
@@ -281,7 +285,11 @@ def align(control: MacroControl, block: Block, code: int) -> None:
         target = turned(control, found.chosen, about_tip=code == ABOUT_TIP)
         if len(found.ways) > 1:
             angles = angles_in_words(control.turning, [target[index] for index in control.turning])
-            control.warn(TURNED_TO, f"{name} is taken to turn to {angles}, the nearest of several ways", SQUARED)
+            control.warn(
+                TURNED_TO,
+                f"{name} turns the rotary axes; ncfix assumes {angles}, the nearest of several positions",
+                SQUARED,
+            )
         hidden = not control.unknown.keys().isdisjoint((X, Y, Z))
     else:
         hidden = bool(control.turning)

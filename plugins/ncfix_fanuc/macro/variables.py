@@ -55,7 +55,7 @@ def variable_number(value: float) -> int:
     """The number of a variable given by a value; raises `Fault` if it is not whole."""
     index = number(value)
     if abs(index - round(index)) > 0.001:
-        raise Fault(ARITHMETIC, f"the number of a variable is {value:g}, and must be a whole number")
+        raise Fault(ARITHMETIC, f"the number of a variable is {value:g}, but must be a whole number")
     return round(index)
 
 
@@ -74,7 +74,7 @@ def from_bcd(value: float) -> float:
     try:
         return float(int(f"{whole_number(value):x}"))
     except ValueError:
-        raise Fault(ARITHMETIC, f"BIN of {value:g}: it is no binary coded decimal") from None
+        raise Fault(ARITHMETIC, f"BIN of {value:g}: not a binary coded decimal") from None
 
 
 def arc_tangent(y: float, x: float) -> float:
@@ -231,11 +231,11 @@ class MacroVariables(NumberedParameters):
     def check_writable(self, key: Key) -> None:
         """Raise `Fault` if the program may not assign to the variable."""
         if key == 0 or not isinstance(key, int):
-            raise Fault(READ_ONLY_FAULT, "#0 is always vacant and cannot be assigned to")
+            raise Fault(READ_ONLY_FAULT, "#0 is always vacant and cannot be set")
         if not exists(key):
             raise Fault(OUT_OF_RANGE, f"there is no variable #{key}")
         if any(key in positions for positions in POSITIONS):
-            raise Fault(READ_ONLY_FAULT, f"#{key} cannot be assigned to: it is where the machine stands")
+            raise Fault(READ_ONLY_FAULT, f"#{key} cannot be set: it is a position of the machine")
 
 
 def is_common(index: int) -> bool:

@@ -67,9 +67,11 @@ def somewhere(control: KlartextControl, axes: int, end: MotionEnd, reason: str) 
 
 BAD_ARC = "NCF220"
 
-NO_TANGENT = "a tangential arc (CT), and the element before leaves no direction from which it can turn"
-NO_ANGLE = "CP without an angle (PA, IPA): whether the control makes a full circle of it or stops is not sure"
-AROUND = "an arc about a pole (CC) that was set before the datum was moved: where it lies is not sure"
+NO_TANGENT = (
+    "a tangential arc (CT), but its direction at the start is not known, or its end is straight ahead or behind"
+)
+NO_ANGLE = "CP without an angle (PA, IPA): whether the control makes a full circle or stops is not certain"
+AROUND = "an arc about a pole (CC) that was set before the datum was shifted: its position is not certain"
 FLAT = 1e-9
 """A length, mm, below which there is no direction; also the least sine of the angle by which CT turns away."""
 
@@ -130,7 +132,7 @@ def circular_polar(control: KlartextControl, step: Step) -> None:
     start, away = start_and_way(control, where, plane)
     centre = pole[0] - start[0], pole[1] - start[1]
     if math.hypot(*centre) < FLAT:
-        raise Fault(BAD_ARC, "the arc has no radius: the tool stands at the pole")
+        raise Fault(BAD_ARC, "the arc has no radius: the tool is at the pole")
     if angle is None:
         angle = sweep_angle(centre, away, 1, clockwise=clockwise)
     elif (angle < 0) != clockwise and angle:
@@ -199,7 +201,7 @@ def is_clockwise(step: Step) -> bool:
 def known_pole(control: KlartextControl) -> tuple[float, float]:
     """The pole in force; a `Fault` if none is known."""
     if control.path.pole is None:
-        raise Fault(BAD_POLE, "an arc about the pole, and no pole (CC) is known")
+        raise Fault(BAD_POLE, "an arc about the pole, but no pole (CC) is known")
     return control.path.pole
 
 

@@ -158,10 +158,10 @@ def renumbered(source: bytes) -> bytes:
 
 
 UNREADABLE = "NCF236"
-NOT_KLARTEXT = "this line is not understood; if it is no Klartext, the control stops at it"
-NOT_FOLLOWED = "the line {} changes coordinates in a way that is not followed"
-DECIDES = "where the program goes on is decided by a line that is not understood"
-HINT = "correct the line, or name the dialect with --dialect"
+NOT_KLARTEXT = "this line is unknown; if it is not Klartext, the control stops here"
+NOT_FOLLOWED = "the line {} may change coordinates in a way that ncfix does not support"
+DECIDES = "an unknown line decides where the program continues"
+HINT = "correct the line, or select the dialect with --dialect"
 
 NUMBER = r"\A\s*/?\s*\d*\s*"
 FLOW = re.compile(

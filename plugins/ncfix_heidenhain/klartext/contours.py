@@ -21,8 +21,8 @@ from ncfix_heidenhain.klartext.plans import QParameters
 from ncfix_heidenhain.klartext.targets import command_of, here, pole_frame
 from ncfix_heidenhain.klartext.units import KlartextUnit
 
-FREE_CONTOUR = "free contour programming (FK): the control works out the contour from what is known of it"
-WRITTEN_OUT = "a free contour (FK): --flatten writes it as lines and arcs"
+FREE_CONTOUR = "free contour programming (FK): the control calculates the contour"
+WRITTEN_OUT = "a free contour (FK): with --flatten ncfix writes it as lines and arcs"
 MAX_GAP_MM = 1e-3
 """By how much the data of a contour may contradict each other: drawings have three decimals."""
 

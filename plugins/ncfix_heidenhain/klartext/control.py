@@ -28,18 +28,18 @@ SPATIAL_MODE = "axis spat"
 """The keys under which corrections are suspended."""
 
 WHICH_WAY = (
-    "the axis {} counts from a datum of its own while the tip leads (M128, PLANE): whether X and Y turn with that "
-    "datum is for a parameter of the machine (presetToAlignAxis)"
+    "the axis {} has a datum of its own under M128 or PLANE: a machine parameter (presetToAlignAxis) decides whether "
+    "X and Y turn with that datum"
 )
 
-RETRACTED = "where the axis {} stands after M140 is not followed"
-MOVED_ALONG = "where the axis {} stands after PLANE ... MOVE, or TURN with MB, is not followed"
-DEPARTED = "where the axis {} stands after a departure (DEP) depends on the radius of the tool"
-AFTER_PROBING = "where the axis {} stands after a probing cycle is known only at run time"
-FREELY = "where the axis {} stands after a free contour (FK) the control works out"
-AFTER_CYCLE = "where the axis {} stands after a cycle with a path of its own is not followed"
+RETRACTED = "the position of the axis {} after M140 is not known"
+MOVED_ALONG = "the position of the axis {} after PLANE ... MOVE, or TURN with MB, is not known"
+DEPARTED = "the position of the axis {} after a departure (DEP) depends on the radius of the tool"
+AFTER_PROBING = "the position of the axis {} after a probing cycle is known only at run time"
+FREELY = "the control calculates the position of the axis {} after a free contour (FK)"
+AFTER_CYCLE = "the position of the axis {} after a cycle with a path of its own is not known"
 SPATIAL_ANGLES = "FUNCTION TCPM AXIS SPAT: A B C are spatial angles, not positions of axes"
-SPATIAL = "where the axis {} stands by spatial angles (AXIS SPAT) the control works out"
+SPATIAL = "the control calculates the position of the axis {} from spatial angles (AXIS SPAT)"
 LED_BY_CONTROL = frozenset({SPATIAL, RETRACTED, MOVED_ALONG, DEPARTED, AFTER_PROBING, FREELY, AFTER_CYCLE})
 """Reasons why an axis is not known that mean: the control itself has moved it.
 
@@ -107,7 +107,7 @@ class KlartextControl(base.ProgramControl):
     turn            rotation in the working plane (cycle 10), degrees
     doubtful        why the transformations in force are not certain; empty if they are
     functions       the transformations that were set by a TRANS function, not by a cycle
-    m128            tool centre point control is on (M128, FUNCTION TCPM)
+    m128            tool-centre-point control is on (M128, FUNCTION TCPM)
     shortest        rotary axes take the shorter way (M126)
     per_revolution  F is per revolution (M136)
     auto_feed       feed of the last TOOL CALL, mm/min

@@ -62,24 +62,24 @@ GAP_PART, DEPTH_PART, THREAD_CUTTING = "1", "2", 18
 
 LAST = re.compile(rf"{VALUE}\s*\Z", re.IGNORECASE)
 ADJUSTING = frozenset({291, 800, 801, 880, *range(1000, 1100)})
-ADJUSTED = "cycle {} may change coordinates, for turning or grinding, in a way that is not followed"
+ADJUSTED = "cycle {} may change coordinates, for turning or grinding, in a way that ncfix does not support"
 BUILDERS = range(300, 400)
 LEADING = frozenset({224, 238})
 """Cycles that move where they are defined: a data matrix code of holes, and a measurement of the machine's state."""
 TILT = 19
-OF_BUILDER = "cycle {} is the machine builder's; what it does where it is defined is not known"
-BY_ITSELF = "cycle {} moves the axes by itself where it is defined"
+OF_BUILDER = "cycle {} is of the machine builder; what it does at its definition is not known"
+BY_ITSELF = "cycle {} moves the axes at its definition"
 CALLING = 12
-CALLED = "a program is called by cycle 12, and what it does is not followed"
+CALLED = "cycle 12 calls a program, which ncfix does not read"
 HARMLESS = frozenset({9, 13, 32, 239, 392})
 """Cycles that move nothing: dwell, spindle orientation, tolerance, load, and the like."""
 
-OWN_PATH = "cycle {} makes a path of its own, which is not corrected"
-AFTER_HOLE = "where the axis {} stands after a hole of unknown depth is not followed"
+OWN_PATH = "cycle {} makes a path of its own, which ncfix does not correct"
+AFTER_HOLE = "the position of the axis {} after a hole of unknown depth is not known"
 DEPTH_AT_RUN_TIME = "the depth of the cycle is known only at run time"
 NOT_EXECUTED = "the depth of the cycle is zero: controls do not execute it, or stop"
-PATTERN = "a pattern of holes ({}): the control works out where they are; --flatten writes them out"
-FROM_INCREMENT = "an old cycle is called from a height in increments (IZ)"
+PATTERN = "a pattern of holes ({}): the control calculates their positions; with --flatten ncfix writes them out"
+FROM_INCREMENT = "an old cycle is called in a block with an incremental height (IZ)"
 
 
 # -- definition -------------------------------------------------------------------------------------------------------
@@ -135,7 +135,7 @@ def call(control: KlartextControl, step: Step) -> None:
     """Execute the cycle in force at the position to which a block leads, or where the axes stand."""
     cycle = control.cycle
     if cycle.number == 0:
-        raise Fault(NO_CYCLE, "a cycle is called, and none is defined before")
+        raise Fault(NO_CYCLE, "a cycle is called, but none is defined before")
     control.use()
     if cycle.number == CALLING:
         control.refuse_rest(CALLED)
@@ -164,7 +164,7 @@ def pattern(control: KlartextControl, places: tuple[HolePosition, ...] | None, n
     """Execute the cycle in force at all places of a pattern; `places` is None if they are not known."""
     control.use()
     if control.cycle.number == 0:
-        raise Fault(NO_CYCLE, "a pattern of holes, and no cycle is defined before")
+        raise Fault(NO_CYCLE, "a pattern of holes, but no cycle is defined before")
     if places is None or control.cycle.number not in (DRILLING | MILLING) - OLD:
         reason = PATTERN.format(name) if places is None else OWN_PATH.format(control.cycle.number)
         control.refuse_here(reason)

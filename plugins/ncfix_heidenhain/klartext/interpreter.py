@@ -76,13 +76,13 @@ TURNING = frozenset({"c", "cp", "cr"})
 CALLING = frozenset({"", "l", "ln", "lp", "cycl call", "cycl call pos"})
 """Blocks that may execute a cycle at their end; after an arc there would be two motions in one block."""
 
-NOT_TAKEN = "{} takes no word {}: the control would stop, or makes a path of it that is not followed"
-TWICE = "{} with a word {} in the plane of its pole: where the control would go is not sure"
-CALLED_BY_ARC = "a cycle that is called in a block with {}: two motions in one block are not followed"
-CALLED_AT_MACHINE = "a cycle that is called in a block with M91 or M92: from which coordinates it drills is not sure"
-NO_FIRST_POINT = "{} without the point at which the contour begins"
-NO_HEIGHT = "CYCL CALL POS without Z: the manuals ask for all three axes, and at which height it is called is not sure"
-COUNTED_HEIGHT = "CYCL CALL POS with a height in increments (IZ): from where the control counts it is not sure"
+NOT_TAKEN = "{} does not allow the word {}: the control would stop, or make a path that ncfix does not support"
+TWICE = "{} with a word {} in the plane of its pole: the end position is not certain"
+CALLED_BY_ARC = "a cycle that is called in a block with {}: two motions in one block are not supported"
+CALLED_AT_MACHINE = "a cycle that is called in a block with M91 or M92: in which coordinates it drills is not certain"
+NO_FIRST_POINT = "{} without the start point of the contour"
+NO_HEIGHT = "CYCL CALL POS without Z: the manuals require all three axes, and the height of the call is not certain"
+COUNTED_HEIGHT = "CYCL CALL POS with an incremental height (IZ): from which position it counts is not certain"
 
 
 def astray(control: KlartextControl, step: Step, *, called: bool) -> str:
@@ -113,9 +113,9 @@ def astray(control: KlartextControl, step: Step, *, called: bool) -> str:
 
 
 AT_RUN_TIME = "NCF277"
-READ = "the program reads or measures it: set it by FN 0 for a program that is to be corrected"
-RADIUS = "it is the radius of the tool: --tool NUMBER=LENGTH,RADIUS"
-ENDS_INSIDE = "a called program with M2 or M30, which the manuals do not allow"
+READ = "the program reads or measures it: for the correction, set it with FN 0 in the program"
+RADIUS = "Q108 is the tool radius: give it as --tool NUMBER=LENGTH,RADIUS"
+ENDS_INSIDE = "a called program has M2 or M30, which the manuals do not allow"
 SUFFIX = re.compile(r"\.h\Z", re.IGNORECASE)
 ELSEWHERE = re.compile(r"CALL\b|SEL\s+PGM\b|F(LT?|CT?)(?=\s|$)", re.IGNORECASE)
 """Statements that rule out reading in parts: calls of other programs, and free contours (FK), which depend on later
@@ -186,7 +186,7 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
 
     def end_of_text(self) -> bool:
         """See `Interpreter`: warn that the text ends without END PGM."""
-        self.control.warn(NO_END, "the program does not end with END PGM", "it may be cut off")
+        self.control.warn(NO_END, "the program does not end with END PGM", "check that the file is complete")
         return False
 
     def take_stretch(self, plan: KlartextPlan) -> bool:
@@ -262,10 +262,10 @@ class KlartextInterpreter(Interpreter[KlartextUnit]):
         if isinstance(value, Unknown):
             code = AT_RUN_TIME if self.watcher is None else RUNTIME
             lacking = value.why
-            text = f"where the program goes on depends on {lacking}, which is known only at run time"
+            text = f"a jump depends on {lacking}, which is known only at run time"
             read = READ if lacking in self.control.scope.parameters.read else ""
             hint = RADIUS if lacking == "Q108" else read
-            raise Fault(code, text, hint or f'variables."{lacking}" in the setup file gives it a value')
+            raise Fault(code, text, hint or f'give its value as variables."{lacking}" in the setup file')
         return value != 0.0
 
     def assign(self, plan: KlartextPlan) -> None:

@@ -32,7 +32,7 @@ from ncfix_heidenhain.klartext.units import FEED, RAPID, KlartextUnit
 
 KINDS = {RAPID: MotionKind.RAPID, FEED: MotionKind.FEED, CLOCKWISE: MotionKind.ARC, COUNTER: MotionKind.ARC}
 PLANE = PLANES[170]
-ODD = "of this arc the interpreter has more to say"
+ODD = "the interpreter reports more on this arc"
 
 
 @frozen

@@ -26,16 +26,20 @@ from ncfix_heidenhain.klartext.targets import (
 )
 
 MACHINE_COORDINATES = "machine coordinates ({})"
-NOT_GIVEN = "where the axis {} stands after M92 depends on its zero point (references.M92 in the setup)"
-NOT_STRAIGHT = "where the axis {} stands after a path other than L in machine coordinates is not followed"
-SQUARE = "the control turns the tool square to the surface (NX NY NZ under M128), and where to is not worked out"
-ORIENTED = "the control works out the rotary axes (TX TY TZ), and what it finds is not known"
+NOT_GIVEN = "the position of the axis {} after M92 depends on the M92 datum: give references.M92 in the setup"
+NOT_STRAIGHT = "the position of the axis {} after a path other than L in machine coordinates is not known"
+SQUARE = (
+    "the control turns the tool normal to the surface (NX NY NZ under M128), and ncfix does not calculate its direction"
+)
+ORIENTED = "the control calculates the rotary axes (TX TY TZ), and their positions are not known"
 TURNS_UNDER_TILT = Passing(
-    Pass.ROTARY_ALONE, "rotary axes are positioned in a tilted plane; the tip is corrected where it moves next"
+    Pass.ROTARY_ALONE, "rotary axes are positioned in a tilted plane; the tool tip is corrected in the next motion"
 )
 MIXED_UNDER_TILT = "linear and rotary axes move together in a tilted plane"
-FAR_INCREMENT = "an increment of more than half a turn under M126: whether it goes the shorter way is not sure"
-OFF = Passing(Pass.LED, "a rapid from where the control itself has led the tool")
+FAR_INCREMENT = (
+    "an increment of more than half a turn under M126: whether the axis takes the shorter path is not certain"
+)
+OFF = Passing(Pass.LED, "a rapid from a position that the control calculates")
 DEPARTURE = Passing(Pass.DEPARTURE, "departure from the contour (DEP)")
 IN_TRAVEL = WayRules(in_travel=True)
 IN_SPACE = 0b111
@@ -163,7 +167,7 @@ def turn_under_tilt(control: KlartextControl, step: Step, end: MotionEnd, axes: 
     refusal, passing = (MIXED_UNDER_TILT, None) if linear else ("", TURNS_UNDER_TILT)
     control.make(Motion(step.kind, axes, MotionEnd(target, unknown), code, refusal=refusal, passing=passing))
     if linear:
-        control.lose(range(3), MIXED_UNDER_TILT + ": where {} stands is not known")
+        control.lose(range(3), MIXED_UNDER_TILT + ": the position of {} is not known")
     control.switch_tip()
     control.path.tangent = None
 

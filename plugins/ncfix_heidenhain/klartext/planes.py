@@ -25,16 +25,16 @@ BAD_PLANE = "NCF273"
 RETRACTING = "mb max"
 """The flag of a PLANE block with MB: the tool is retracted before the axes turn."""
 
-POSITIONED = "where the axis {} stands after PLANE ... TURN or MOVE the control works out"
-NOT_NORMAL = "the tool does not stand normal to the tilted plane, by the axis positions of the program"
+POSITIONED = "the control calculates the position of the axis {} after PLANE ... TURN or MOVE"
+NOT_NORMAL = "with the axis positions of the program the tool is not normal to the tilted plane"
 TURNED = Passing(Pass.ALIGNMENT, "the control positions the rotary axes (PLANE)")
 WAY = "NCF279"
 WAY_HINT = "state the rotary axes in the program; a PLANE block may say SEQ+ or SEQ-"
-HOME = "PLANE RESET is taken to turn the rotary axes to zero, their basic position"
+HOME = "PLANE RESET: ncfix assumes that the rotary axes turn to zero, their basic position"
 RUNTIME = "the tilted plane depends on a Q parameter that is known only at run time"
 ANGLES = "NCF284"
 ANGLES_HINT = "a machine parameter decides: compare Q120 to Q122 on the control, or use PLANE"
-NO_KINEMATICS = "the tilted plane is given by the positions of rotary axes (PLANE AXIAL, cycle 19)"
+NO_KINEMATICS = "positions of rotary axes define the tilted plane (PLANE AXIAL, cycle 19)"
 CALCULATED = ("Q120", "Q121", "Q122")
 """The parameters in which the control stores the positions of A, B and C that it has worked out."""
 
@@ -172,7 +172,9 @@ def chosen_way(control: KlartextControl, tilt: Rotation | None, flags: frozenset
         at_zero = abs(found.ways[0][0]) < MIN_SIGNED_RAD
         return found.chosen if at_zero and not turned else None
     if len(found.ways) > 1:
-        control.warn(WAY, f"the rotary axes are taken to turn to {found}, the nearest of several ways", WAY_HINT)
+        control.warn(
+            WAY, f"ncfix assumes that the rotary axes turn to {found}, the nearest of several positions", WAY_HINT
+        )
     return found.chosen
 
 
@@ -181,7 +183,7 @@ def way_home(control: KlartextControl) -> dict[int, float] | None:
     if any(control.offset[index] for index in control.turning):
         return None
     if any(index in control.unknown or abs(control.position[index]) > MIN_SIGNED_RAD for index in control.turning):
-        control.warn(WAY, HOME, "state the rotary axes in the next block")
+        control.warn(WAY, HOME, "program the rotary axes in the next block")
     return dict.fromkeys(control.turning, 0.0)
 
 
@@ -229,7 +231,7 @@ def cycle_19(control: KlartextControl, words: MotionWords) -> None:
     if not square and all(INDEX[letter] in control.axis_indices for letter in values):
         other = plane_of(control, values)
         if other is not None and math.dist(normal_of(other), normal_of(meant)) > 1e-6:
-            control.warn(ANGLES, "cycle 19 is taken to name spatial angles, not positions of rotary axes", ANGLES_HINT)
+            control.warn(ANGLES, "cycle 19: ncfix assumes spatial angles, not positions of rotary axes", ANGLES_HINT)
     tilt_to(control, meant, frozenset())
 
 

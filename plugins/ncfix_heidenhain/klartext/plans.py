@@ -278,7 +278,7 @@ class QExpressions(Expressions):
 
     operators = OPERATORS
     functions = FUNCTIONS_OF_FORMULAS
-    impossible = "{} cannot be computed here"
+    impossible = "{} cannot be calculated here"
 
     def text(self, text: str) -> Evaluate:
         """The function that evaluates a string, or a word such as AUTO: it has no number."""

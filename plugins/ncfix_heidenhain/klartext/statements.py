@@ -82,28 +82,28 @@ class KlartextFlow(ProgramFlow[KlartextUnit]):
         """CALL PGM: enter another program, which has QL parameters of its own."""
         found = self.find(name)
         if found is None:
-            hint = "put its file beside the program, or say where it is: --subprograms DIR"
+            hint = "copy its file to the folder of the program, or give its folder with --subprograms DIR"
             raise Fault(NO_SUBPROGRAM, f"the program {name} is not found", hint)
         if found.mm != self.unit.mm:
-            raise Fault(NO_SUBPROGRAM, f"the program {name} is written in another unit of length")
+            raise Fault(NO_SUBPROGRAM, f"the program {name} has another unit of length")
         self.check_depth(name)
         local = self.parameters.enter()
         self.enter(OpenCall(name, (found, found.begin), kind=PROGRAM, leave=lambda: self.parameters.leave(local)))
 
 
 SUSPENDING = {
-    104: "M104: the datum that was set last comes back into force",
-    114: "M114: the control works the geometry of the machine into positions",
-    144: "M144: the control works the geometry of the machine into positions",
+    104: "M104: the datum that was set last comes into force again",
+    114: "M114: the control adds the geometry of the machine to positions",
+    144: "M144: the control adds the geometry of the machine to positions",
 }
 ENDING = {115: 114, 145: 144}
-DELETED = "M142: the control deletes what is in force of transformations, in part"
-CHOSEN = "M138: the control takes only some of the rotary axes into account"
+DELETED = "M142: the control deletes some of the transformations in force"
+CHOSEN = "M138: the control includes only some of the rotary axes"
 UNTILTED = "M130: coordinates of the untilted system in a tilted plane"
 RETRACT = Passing(Pass.RETRACTION, "retract along the tool axis (M140)")
-COUNTED = "from where the axis {} counts after M126 depends on a parameter of the machine: it went past a turn"
+COUNTED = "the position of the axis {} after M126 depends on a machine parameter: it was moved beyond a full turn"
 BESIDE_RETRACTION = (
-    "M140 retracts the tool at the start of its block: where the words of axes beside it lead is not sure"
+    "M140 retracts the tool at the start of its block: the end position of the axis words in that block is not certain"
 )
 NAMED_AXES = frozenset({"axis a", "axis b", "axis c"})
 """Names of axes after M94 and M138."""
@@ -166,7 +166,7 @@ def choose_axes(control: KlartextControl, flags: frozenset[str]) -> None:
 
 
 def tip_control(control: KlartextControl, *, on: bool) -> None:
-    """Turn tool centre point control on or off (M128, M129, FUNCTION TCPM)."""
+    """Turn tool-centre-point control on or off (M128, M129, FUNCTION TCPM)."""
     control.m128 = on
     control.switch_tip()
 
@@ -190,8 +190,8 @@ def after_motion(control: KlartextControl, code: int, own: MotionWords, flags: f
 NAMED = -1
 """The number of a tool that is called by name."""
 
-OTHER_AXIS = "the tool axis is {}: only tools along Z are followed"
-OVERSIZE = "whether the oversize (DL) stays in force where TOOL CALL names no tool is not certain"
+OTHER_AXIS = "the tool axis is {}: ncfix supports tools along Z only"
+OVERSIZE = "whether the oversize (DL) stays in force after a TOOL CALL without a tool is not certain"
 AT_RUN_TIME = "the length of the tool is known only at run time"
 
 
@@ -295,7 +295,9 @@ def length_of(control: KlartextControl, number: int) -> float:
 
 
 PROBING = Passing(Pass.PROBING, "probing")
-MEASURED = "TCH PROBE {} makes what it measures the datum, a rotation or the kinematics: that is known only at run time"
+MEASURED = (
+    "TCH PROBE {} sets the datum, a rotation or the kinematics from its measurement, which is known only at run time"
+)
 SETTING = frozenset({*range(400, 406), *range(408, 420), *range(450, 454), *range(1400, 1500)})
 """Probing cycles that not only measure but set a datum, a rotation or the kinematics.
 
@@ -306,10 +308,10 @@ OF_THE_TOOL = frozenset({31, 33, 481, 483, *range(580, 590)})
 """Probing cycles that measure the length of the tool in the spindle."""
 
 TOOL_MEASURED = "NCF281"
-LENGTH_MEASURED = "TCH PROBE {} measures the tool, and its length in the setup is taken to be what the control finds"
+LENGTH_MEASURED = "TCH PROBE {} measures the tool; ncfix assumes that the control finds the length of the setup"
 
-OTHER_POINT = "FUNCTION TCPM with a reference point other than the tip"
-SELECTED = "PRESET SELECT by a parameter, with other words, or while coordinates are transformed, is not followed"
+OTHER_POINT = "FUNCTION TCPM with a reference point other than the tool tip"
+SELECTED = "PRESET SELECT with a parameter, with other words, or while coordinates are transformed, is not supported"
 ERROR = "NCF278"
 PROBED = range(100, 200)
 """The Q parameters in which probing cycles and the control store results."""
@@ -343,12 +345,16 @@ def call_selected(control: KlartextControl, flow: KlartextFlow, match: re.Match[
     if flow.selected:
         flow.call_program(flow.selected)
     else:
-        control.refuse_rest("the program that is called is chosen at run time")
+        control.refuse_rest("which program is called is known only at run time")
 
 
 def error(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """FN 14: the program stops with an error of its own."""
-    raise Fault(ERROR, f"the program stops with error {match['number']}", "its own checks refuse its parameters")
+    raise Fault(
+        ERROR,
+        f"the program stops with error {match['number']}",
+        "the program checks its parameters and does not accept them",
+    )
 
 
 # -- what is not followed ---------------------------------------------------------------------------------------------
@@ -357,7 +363,7 @@ def error(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) ->
 def not_followed(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) -> None:
     """Refuse the rest of the program: the statement may change coordinates, or what later blocks do."""
     name = " ".join(match[0].partition(":")[0].split()[:3]).upper()
-    control.refuse_rest(f"{name} may change coordinates in a way that is not followed")
+    control.refuse_rest(f"{name} may change coordinates in a way that ncfix does not support")
 
 
 # -- what is measured and read ----------------------------------------------------------------------------------------
@@ -367,7 +373,7 @@ def probe(control: KlartextControl, flow: KlartextFlow, match: re.Match[str]) ->
     """TCH PROBE: the control moves by itself, stores results in Q parameters, and may set a datum by them."""
     number = int(match["number"])
     if number in OF_THE_TOOL:
-        control.warn(TOOL_MEASURED, LENGTH_MEASURED.format(number), "give the length that the tool has when it cuts")
+        control.warn(TOOL_MEASURED, LENGTH_MEASURED.format(number), "give the length of the tool when it cuts")
     elif number in SETTING or 500 <= number < 1400:
         control.suspend(PRESET, MEASURED.format(number))
     control.pass_here(PROBING, AFTER_PROBING, "XYZ")

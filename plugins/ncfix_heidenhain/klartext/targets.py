@@ -19,9 +19,9 @@ from ncfix_heidenhain.klartext.control import SPATIAL, KlartextControl
 from ncfix_heidenhain.klartext.plans import MOVING
 
 BAD_POLE = "NCF271"
-POLE_MOVED = "where the axis {} goes from a pole (CC) that was set before the datum was moved is not sure"
-COUNTED_FROM = "where the axis {} stands after incremental words with M91 depends on what the control counts from"
-RUNTIME = "where the axis {} stands depends on a Q parameter that is known only at run time"
+POLE_MOVED = "the end position of the axis {} from a pole (CC) that was set before the datum was shifted is not certain"
+COUNTED_FROM = "the position of the axis {} after incremental words with M91 depends on the control"
+RUNTIME = "the position of the axis {} depends on a Q parameter that is known only at run time"
 PLANE_OF = {frozenset((X, Y)): PLANES[170], frozenset((Z, X)): PLANES[180], frozenset((Y, Z)): PLANES[190]}
 """Set of two axes -> their plane; polar angles count from its first axis (X, Z, Y) towards its second."""
 
@@ -181,7 +181,7 @@ def polar(control: KlartextControl, words: MotionWords) -> tuple[FramePosition, 
     """The position to which polar words lead, and the angle IPA, rad; None without IPA."""
     path = control.path
     if path.pole is None:
-        raise Fault(BAD_POLE, "polar coordinates, and no pole (CC) is known")
+        raise Fault(BAD_POLE, "polar coordinates, but no pole (CC) is known")
     plane, (first, second) = path.plane, path.pole
     control.use_start_positions(plane.pair)
     start = here(control)

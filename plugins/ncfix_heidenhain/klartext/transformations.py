@@ -21,18 +21,20 @@ from ncfix.control.frames import WORLD, Affine, FrameStack, mirrored, turned_in
 from ncfix_heidenhain.klartext.control import PRESET, KlartextControl
 from ncfix_heidenhain.klartext.targets import MotionWords
 
-SHIFT_IN_ROTATION = "a datum shift while mirror, rotation or scale is active: whether it turns along is not sure"
-SHIFT_UNDER_TILT = "a datum shift on both sides of a tilted plane: how the control adds them up is not sure"
-MIRROR_AND_ROTATION = "mirror and rotation together: their order is not sure"
+SHIFT_IN_ROTATION = (
+    "a datum shift while mirror, rotation or scale is active: whether the control transforms the shift is not certain"
+)
+SHIFT_UNDER_TILT = "datum shifts before and in a tilted plane: how the control combines them is not certain"
+MIRROR_AND_ROTATION = "mirror and rotation together: their order is not certain"
 MIRRORED_ROTARY = "a mirrored rotary axis"
 
 FORM = re.compile(r"TRANS\s+(?P<kind>MIRROR|ROTATION|SCALE|DATUM)\s*(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
 NUMBER = re.compile(r"(?P<word>IROT|ROT|SCL)\s*(?P<value>[+-]?\s*(\d+([.,]\d*)?|[.,]\d+))\Z", re.IGNORECASE)
 AXES = re.compile(r"AXIS(\s+[XYZ])+\Z", re.IGNORECASE)
-FROM_TABLE = "the datum of the axis {} comes from a table that is not given"
+FROM_TABLE = "the datum of the axis {} is from a datum table, which is not given"
 AT_RUN_TIME = "the datum of the axis {} is known only at run time"
-NOT_FOLLOWED = "TRANS {} with words that are not followed"
-BOTH = "TRANS {} and a cycle of the same kind at once: how they add up is not sure"
+NOT_FOLLOWED = "TRANS {} with words that are not supported"
+BOTH = "TRANS {} and a cycle of the same kind are both active: how the control combines them is not certain"
 BY_FUNCTION = {8: "MIRROR", 10: "ROTATION", 11: "SCALE"}
 """Cycle -> the TRANS function that does the same."""
 
@@ -226,7 +228,7 @@ def scale(control: KlartextControl, words: MotionWords, text: str) -> None:
     suspend(control, words, "scale")
     factor = 1.0 if "SCL" in words.unknown else words.values.get("SCL", 1.0)
     if factor <= 0.0:
-        control.suspend("scale", "a scale that is not above zero (cycle 11)")
+        control.suspend("scale", "a scale factor that is zero or negative (cycle 11)")
     scale_by(control, factor if factor > 0.0 else 1.0)
 
 

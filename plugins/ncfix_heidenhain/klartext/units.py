@@ -201,10 +201,10 @@ class KlartextUnit(TextUnit[KlartextPlan]):
             text = self.program.slice(block, statement[1])
             if found := BEGIN.match(text):
                 return block + 1, self._unit(found["rest"])
-        raise Fault(NO_BEGIN, "there is no BEGIN PGM: this is no Klartext program")
+        raise Fault(NO_BEGIN, "there is no BEGIN PGM: this is not a Klartext program")
 
     def _unit(self, rest: str) -> float:
         found = UNIT.search(rest.strip().strip('"'))
         if found is None:
-            raise Fault(NO_BEGIN, "BEGIN PGM names no unit", "it ends with MM or INCH")
+            raise Fault(NO_BEGIN, "BEGIN PGM has no unit", "end it with MM or INCH")
         return MM_PER_UNIT[found[1].upper()]

@@ -30,8 +30,8 @@ BY_PATH = frozenset({"c", "ct", "ctp", "cp", "lp"})
 SAID_BY_WORDS = ("", "l", "ln", "ct", "ctp")
 """Path functions whose words are always compared one by one with what is wanted: `_as_it_is` leaves them out."""
 
-WHICH_POLE = "the arc needs a pole of its own, and which one was in force before it the text does not tell"
-NOT_CLOSED = "the full circle begins at a place that its own words have too few digits to name"
+WHICH_POLE = "the arc needs a pole of its own, but the text does not show which pole was in force before it"
+NOT_CLOSED = "the start of the full circle cannot be written with the digits of its own words"
 
 SURFACE = "Q203"
 """The parameter of cycles of the 200s for the height of the surface."""

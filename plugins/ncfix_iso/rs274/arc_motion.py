@@ -13,7 +13,7 @@ from ncfix_iso.rs274.parameters import whole
 LATHE_PLANE = 180
 """G18, the plane in which lathes cut: Z and X."""
 
-SPIRAL = "the arc winds further than its end says (L, P, Q, or a centre word across its plane)"
+SPIRAL = "the arc has more turns than its end point gives (L, P, Q, or a centre word normal to its plane)"
 
 
 def arc(control: RS274Control, block: Block, code: int) -> None:
@@ -45,7 +45,7 @@ def turns_of(block: Block) -> int:
     """The P word: number of turns in which the arc reaches its end."""
     turns = whole(block.get("P", 1.0), "P, the number of turns")
     if turns < 1:
-        raise Fault(ARC_FAULT, f"P, the number of turns, is {turns}, and must be 1 or more")
+        raise Fault(ARC_FAULT, f"P, the number of turns, is {turns}, but must be 1 or more")
     return turns
 
 
@@ -70,7 +70,7 @@ def spiral(block: Block, plane: Plane) -> str:
 def check_words(control: RS274Control, block: Block, plane: Plane) -> None:
     """Raise `Fault` if the block lacks the words that an arc in its plane needs."""
     if plane.across > 2:
-        raise Fault(ARC_FAULT, "there are no arcs in the planes G17.1, G18.1 and G19.1")
+        raise Fault(ARC_FAULT, "arcs are not possible in the planes G17.1, G18.1 and G19.1")
     centre = [letter for letter in CENTRE_LETTERS if letter in block.values]
     if "R" in block.values:
         if centre and not control.rules.radius_first:
@@ -82,7 +82,7 @@ def check_words(control: RS274Control, block: Block, plane: Plane) -> None:
         raise Fault(ARC_FAULT, "the arc has neither R nor a centre (I J K)")
     across = CENTRE_LETTERS[plane.across]
     if control.rules.strict and across in block.values:
-        raise Fault(ARC_FAULT, f"{across} belongs to no arc in the plane G{plane.code // 10}")
+        raise Fault(ARC_FAULT, f"{across} is not a centre word of the plane G{plane.code // 10}")
     wanted = plane.of(CENTRE_LETTERS)
     missing = [letter for letter in wanted if letter not in block.values]
     if control.modal.arc_absolute and missing:
@@ -107,11 +107,15 @@ def supposed(control: RS274Control, block: Block, plane: Plane, end: Point) -> s
     letters = plane.of(CENTRE_LETTERS)
     across = CENTRE_LETTERS[plane.across]
     if "R" not in block.values and across in block.values and not all(letter in block.values for letter in letters):
-        return f"{across} is a centre in another plane, and G{plane.code // 10} is in force (lathes cut in G18)"
+        return (
+            f"{across} is a centre word of another plane than G{plane.code // 10}, which is in force (lathes use G18)"
+        )
     if control.modal.diameter or plane.code != LATHE_PLANE or control.modal.arc_absolute:
         return ""
     try:
         centre_of(control, block, plane, (end[0], end[1] / 2), clockwise=True)
     except Fault:
         return ""
-    return "with X as a diameter the arc would be one: is the program for a lathe? X is read as a radius"
+    return (
+        "the arc would close if X were a diameter: check whether the program is for a lathe; ncfix reads X as a radius"
+    )

@@ -17,7 +17,7 @@ from ncfix.values import mutable
 from ncfix_iso.rs274.groups import ARCS, RULES, Rules, with_own_codes
 from ncfix_iso.rs274.parameters import NumberedParameters, Store
 
-RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
+RUNTIME_BRANCH = "which blocks are executed from here on is known only at run time"
 
 
 PASSING = frozenset(
@@ -174,8 +174,8 @@ class RS274Control(shared.ProgramControl):
 
     def position_is_read(self, name: str) -> None:
         """Report that the program reads a position."""
-        text = f"the program reads the position {name}: on the machine it finds the corrected one there"
-        self.warn(POSITION_READ, text, "motions that are computed from it are refused")
+        text = f"the program reads the position {name}; in the corrected program this is the corrected position"
+        self.warn(POSITION_READ, text, "motions that depend on it are refused")
 
     def coordinate(self, index: int) -> Value:
         """Position of an axis in program units, X as a radius; `Unknown` if it is known only at run time."""

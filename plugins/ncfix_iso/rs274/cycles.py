@@ -20,11 +20,11 @@ from ncfix_iso.rs274.systems import check_system, words_of
 BAD_CYCLE = "NCF226"
 AXES_SAID = "NCF245"
 """Code for: a parameter of the control decides on which axes a code acts."""
-ACROSS = "drilling cycles in G18 and G19 are taken to go along the axis across the plane"
-WHICH_AXIS = "check which axis the control drills along (Fanuc: parameter 5101 FXY)"
-AFTER_NONE = "where the axis {} stands after a cycle without a hole (K0, L0) differs from control to control"
+ACROSS = "drilling cycles in G18 and G19: ncfix assumes that they drill along the axis normal to the plane"
+WHICH_AXIS = "check along which axis the control drills (Fanuc: parameter 5101 FXY)"
+AFTER_NONE = "the position of the axis {} after a cycle without a hole (K0, L0) depends on the control"
 AT_RUN_TIME = "a word of the cycle is known only at run time"
-NO_DEPTH = "the retract plane (R) lies at the bottom of the hole"
+NO_DEPTH = "the retract plane (R) is at the bottom of the hole"
 NEEDED_WORDS = {730: "Q", 830: "Q", 820: "P", 860: "P", 880: "P", 890: "P", 870: "IJK"}
 """Words without which LinuxCNC refuses to start a cycle."""
 PATTERN_WORDS = frozenset("IJKLPXY")
@@ -55,7 +55,7 @@ def check_cycle(control: RS274Control, block: Block, code: int) -> None:
         return
     modal = control.modal
     if not modal.feed_given or modal.feed_mode == FeedMode.INVERSE_TIME:
-        raise Fault("NCF225", "a canned cycle needs a feed (F) per minute or revolution")
+        raise Fault("NCF225", "a canned cycle needs a feed rate (F) per minute or per revolution")
     if modal.compensated:
         raise Fault(BAD_CYCLE, "canned cycles cannot be used with cutter compensation")
     turned = [letter for letter in "ABC" if letter in block.values]
@@ -63,7 +63,7 @@ def check_cycle(control: RS274Control, block: Block, code: int) -> None:
         raise Fault(BAD_CYCLE, f"{turned[0]} cannot move in a canned cycle")
     missing = [letter for letter in NEEDED_WORDS.get(code, "") if letter not in block.values]
     if modal.motion != code and missing:
-        raise Fault(BAD_CYCLE, f"{missing[0]} is missing: G{code // 10} cannot begin without it")
+        raise Fault(BAD_CYCLE, f"{missing[0]} is missing: G{code // 10} needs it")
     if "Q" in NEEDED_WORDS.get(code, "") and block.get("Q", 1.0) <= 0.0:
         raise Fault(BAD_CYCLE, "Q, the depth of one peck, must be positive")
 
@@ -76,7 +76,7 @@ def take_words(control: RS274Control, block: Block, code: int, plane: Plane) -> 
     level_letter = control.dialect.cycle_of(code).level
     for letter in (level_letter, depth_letter):
         if letter not in block.values and not in_force:
-            raise Fault(BAD_CYCLE, f"{letter} is missing: a canned cycle cannot begin without it")
+            raise Fault(BAD_CYCLE, f"{letter} is missing: a canned cycle needs it")
     if not in_force:
         sticky.unknown = False
     if level_letter in block.values:

@@ -30,7 +30,9 @@ CALL_WORDS = frozenset("PLQ")
 KEPT = frozenset({"program name", "control character", "command"})
 """Kinds of opaque text that a flat program keeps."""
 
-COMPUTED_CALL = "a macro that is not at hand is called with computed values, so the program cannot be written out flat"
+COMPUTED_CALL = (
+    "a macro that ncfix does not have is called with calculated values, so the program cannot be written out flat"
+)
 OTHER_DECIMALS, VARIABLE_DECIMALS = 4, 6
 PLAIN = Spelling()
 LENGTHS = frozenset((*CENTRE_LETTERS, "R", "Q"))
@@ -135,7 +137,7 @@ class RS274Flattener(Flattener):
         unplaced = self.control.places.unplaced & axes
         index = next((index for index in self.control.axis_indices if unplaced >> index & 1), None)
         if index is not None:
-            what = f"the program has not said where the axis {LETTERS[index]} stands"
+            what = f"the program has not yet given the position of the axis {LETTERS[index]}"
             raise Fault(RUNTIME, f"{what}, so it cannot be written out flat")
 
     def check(self) -> None:
@@ -166,7 +168,7 @@ class RS274Flattener(Flattener):
         """The value of a parameter as text; raises `Fault` if it depends on the machine at run time."""
         parameters = self.control.parameters
         if parameters.is_unknown(number):
-            what = f"what #{number} is set to"
+            what = f"the value of #{number}"
             raise Fault(RUNTIME, f"{what} is known only at run time, so the program cannot be written out flat")
         value = nominal(parameters.numbered(number))
         return "#0" if math.isnan(value) else PLAIN.short(value, VARIABLE_DECIMALS)

@@ -26,7 +26,7 @@ MAX_CALLS = 9
 
 GLOBAL = frozenset({"sub", "endsub", "call", "return", "program"})
 ENDS_OF_LOOPS = {"endwhile": "while", "endrepeat": "repeat"}
-NO_REPEATS = "whether a call with L0 is executed differs from control to control"
+NO_REPEATS = "whether a call with L0 is executed depends on the control"
 BY_CODE = "M98"
 """Kind of the calls that share #1 to #30 with the caller."""
 
@@ -120,7 +120,7 @@ class OWords(ProgramFlow[RS274Unit]):
         known = self.labels.setdefault(name, Label(self.unit, self.block - 1, flow.keyword))
         if known.block != self.block - 1 or known.unit is not self.unit:
             line = known.unit.program.line(known.block)
-            raise Fault(BAD_FLOW, f"the label {oword(name)} is used already, in line {line}")
+            raise Fault(BAD_FLOW, f"the label {oword(name)} is already used in line {line}")
         return known
 
     def known(self, name: str, keyword: str, *openings: str) -> Label:
@@ -166,7 +166,7 @@ class OWords(ProgramFlow[RS274Unit]):
         name, keyword = self.name_of(flow), flow.keyword
         self.name = name
         if keyword in ("sub", "program") and self.defining is not None:
-            raise Fault(BAD_FLOW, f"{oword(name)} {keyword} stands inside the subprogram {oword(self.defining)}")
+            raise Fault(BAD_FLOW, f"{oword(name)} {keyword} is inside the subprogram {oword(self.defining)}")
         if self.skipping is not None and (self.skipping != name or keyword == "call"):
             return True
         if self.skipping_to_sub and keyword not in ("sub", "program"):
@@ -187,7 +187,7 @@ class OWords(ProgramFlow[RS274Unit]):
         """The error for a text that ends while something is still awaited."""
         label = oword(self.skipping or "")
         if self.skipping_to_sub:
-            hint = "it is looked for further down, in files beside the program, and where --subprograms DIR says"
+            hint = "ncfix searches the rest of the file, the folder of the program and that of --subprograms DIR"
             return Fault(NO_SUBPROGRAM, f"there is no subprogram {label}", hint)
         what = "endsub" if self.defining is not None else "the end"
         return Fault(BAD_FLOW, f"the program ends and {what} of {label} is missing")
@@ -200,7 +200,7 @@ class OWords(ProgramFlow[RS274Unit]):
         if self.calls and self.skipping is not None and by_code != (flow.keyword == "program"):
             raise Fault(
                 BAD_FLOW,
-                f"{oword(name)} is called with {'M98' if by_code else 'call'} and begins with the other's form",
+                f"{oword(name)} is called with {'M98' if by_code else 'call'}, but does not begin in the form for that",
             )
         if self.skipping is not None:
             self.enter_label(flow, name)
@@ -256,7 +256,7 @@ class OWords(ProgramFlow[RS274Unit]):
         """`endsub` and `return`."""
         if not self.calls:
             if self.defining is None:
-                raise Fault(BAD_FLOW, f"{oword(name)} {flow.keyword} stands outside a subprogram")
+                raise Fault(BAD_FLOW, f"{oword(name)} {flow.keyword} is outside a subprogram")
             if flow.keyword == "endsub":
                 self.defining = self.skipping = None
             return

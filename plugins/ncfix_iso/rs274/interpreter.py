@@ -39,7 +39,7 @@ def explicit_motion(control: RS274Control, codes: Codes, motion: int, has_axes: 
         only_modal(control, motion, "two G codes of the block both use its axis words")
         return None
     if motion == NO_MOTION and has_axes and not codes.takes and control.rules.strict:
-        raise Fault(BAD_MOTION, "axis words cannot be used with G80")
+        raise Fault(BAD_MOTION, "axis words are not allowed with G80")
     if not has_axes and motion not in WITHOUT_AXES:
         only_modal(control, motion, f"G{motion / 10:g} needs an axis word")
         return None
@@ -61,15 +61,15 @@ LAST_PROGRAM = 9999
 """Larger P words of M98 on ISO controls contain the repeat count before the four digits of the program."""
 
 POLAR_WORDS = "polar coordinates (@ ^); --flatten writes them in X and Y"
-COMPUTED_ALIAS = "the code {} is computed, and takes words under other addresses than the code it stands for"
-MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
+COMPUTED_ALIAS = "the code {} is calculated, and its words have other addresses than those of the code that it replaces"
+MACHINE_MOVED = "the position of the axis {} after a command to the control is not known"
 UNREADABLE = "NCF236"
 NOT_SET = "NCF244"
 BAD_CALL = "NCF242"
-REPEATS = "whether K beside M98 repeats the call differs from control to control"
+REPEATS = "whether K in a block with M98 repeats the call depends on the control"
 HARMLESS_COMMAND = re.compile(r"\$(?:[$#GINX]?|N\d*=.*|\d{1,2}=.*|\w+\.MIN%?)(?=[;(]|$)")
 """Harmless commands: Grbl's `$$`, `$X`, `$10=3`, but not steps per mm (`$100=`); and the head of Okuma's files."""
-NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"
+NOT_KNOWN = "the command {} is unknown and may move axes or change coordinates"
 DWELL_TIME = "PUX"
 """Words of G4 on ISO controls; besides P, X is a motion on some."""
 
@@ -79,7 +79,7 @@ INCREMENTS = " If U V W are increments of X Y Z, as on lathes: these are not fol
 def calls_of(block: Block) -> int:
     """How often M98 calls."""
     if "K" in block.values:
-        raise Fault(BAD_CALL, REPEATS, "write how often in L")
+        raise Fault(BAD_CALL, REPEATS, "write the number of repeats in L")
     return whole(block.get("L", 1.0), "L of M98")
 
 
@@ -109,7 +109,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
 
     def not_set(self, number: int) -> Value:
         """Report a variable that the program reads and has not set; its value is known only at run time."""
-        text = f"the program reads #{number}, which it has not set: what is in it is known only at run time"
+        text = f"the program reads #{number} without setting it: its value is known only at run time"
         self.control.warn(NOT_SET, text, f'variables."#{number}" in the setup file')
         return Unknown(f"#{number}")
 
@@ -150,7 +150,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         fault = self.flow.unfinished()
         if fault is not None:
             raise fault
-        self.control.warn(NO_END, "the program does not end with M2 or M30", "some controls refuse it")
+        self.control.warn(NO_END, "the program does not end with M2 or M30", "some controls refuse such a program")
         return False
 
     # -- one block ----------------------------------------------------------------------------------------------------
@@ -197,7 +197,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
         """Execute a block of words and assignments; returns whether the program ends there."""
         control = self.control
         if plan.unread:
-            raise Fault(UNREADABLE, "this line cannot be read, and the control gets to it")
+            raise Fault(UNREADABLE, "this line cannot be read, and the program executes it")
         if plan.fault is not None:
             raise plan.fault
         control.enter_block(plan.letters)
@@ -229,7 +229,9 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             return None
         if has_axes and modal in (NO_MOTION, -1):
             if control.rules.strict:
-                raise Fault(BAD_MOTION, "axis words, and no motion code is in force", "G0 or G1 is missing")
+                raise Fault(
+                    BAD_MOTION, "the block has axis words, but no motion code is in force", "G0 or G1 is missing"
+                )
             return NO_CODE
         if has_axes:
             return modal
@@ -361,7 +363,7 @@ class RS274Interpreter(Interpreter[RS274Unit]):
             missing = [] if table is None or codes.motion is None else [x for x in table.needs if x not in block.values]
             if missing:
                 name = f"G{(codes.motion or 0) / 10:g}"
-                raise Fault(BAD_CYCLE, f"{missing[0]} is missing: {name} cannot begin without it")
+                raise Fault(BAD_CYCLE, f"{missing[0]} is missing: {name} needs it")
             code = motion if table is None else DRILLING
             step = self.control.rules.steps.get(code) or MOTIONS[code]
             with self.polar_words(block):

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 MAY_REPEAT = frozenset("GM")
 """Addresses that may occur several times in a block."""
 
-NO_KEYWORD = "the correction needs a word for {}, and the language has none"
+NO_KEYWORD = "the correction needs a word for {}, but the language has none"
 NO_TREE = "the grammar has to make a tree of words and values, as common.lark does, and made"
 
 PRODUCT = re.compile(r"#[^(;\[]*(?P<operator>\*)\d+(?=;|$)")
@@ -103,7 +103,7 @@ def check_repeats(parsed: Parsed, standby: bool = True) -> None:
     may = MAY_REPEAT | {"T"} if standby and TOOL_CHANGE in parsed.template.m_codes else MAY_REPEAT
     for word in parsed.template.words:
         if word.address in seen and word.address not in may:
-            raise BlockError("NCF117", f"the word {word.address} stands twice", start_of(word, parsed))
+            raise BlockError("NCF117", f"the word {word.address} appears twice", start_of(word, parsed))
         seen.add(word.address)
 
 
@@ -191,7 +191,7 @@ def unroll(interpreter: RS274Interpreter, steps: Mapping[str, float], limit: int
     from ncfix_iso.rs274.flatten import RS274Flattener
 
     if has_keywords(interpreter.dialect):
-        text = "what is written out flat is G code, which this language is not"
+        text = "flat programs are G code, but this language is not"
         raise SourceError.of(RUNTIME, text, interpreter.place())
     flattener = RS274Flattener(interpreter.control, steps, limit)
     interpreter.watcher, interpreter.control.ends = flattener, []

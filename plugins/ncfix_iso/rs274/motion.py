@@ -16,8 +16,11 @@ from ncfix.control.tcp import led_in_machine
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import REFERENCES, check_system, is_given, store, stored, words_of
 
-AFTER_ROTATION = "where the axis {} goes after G68 or G69 differs from control to control until both axes are named"
-RUNTIME = "where the axis {} stands is known only at run time"
+AFTER_ROTATION = (
+    "the end position of the axis {} after G68 or G69 depends on the control until both axes of the plane are "
+    "programmed"
+)
+RUNTIME = "the position of the axis {} is known only at run time"
 POLAR = "NCF223"
 
 
@@ -113,12 +116,12 @@ def cartesian(control: RS274Control, block: Block) -> Block:
 def by_radius_and_angle(control: RS274Control, block: Block, x: float, y: float) -> tuple[float, float]:
     """X and Y of polar words, from a position, in program units; what is omitted stays, or in G91 is added."""
     if control.modal.plane.code != 170:
-        raise Fault(POLAR, "polar coordinates are for the plane G17 only")
+        raise Fault(POLAR, "polar coordinates are allowed in the plane G17 only")
     if block.values.keys() & {"X", "Y"}:
-        raise Fault(POLAR, "a block has either polar coordinates or X and Y")
+        raise Fault(POLAR, "the block has both polar coordinates and X or Y")
     radius, angle = math.hypot(x, y), math.degrees(math.atan2(y, x))
     if radius == 0.0 and (control.modal.incremental or "^" not in block.values):
-        raise Fault(POLAR, "at the origin a polar coordinate needs both radius and angle, absolute")
+        raise Fault(POLAR, "at the origin polar coordinates need both radius and angle, in G90")
     if control.modal.incremental:
         radius, angle = radius + block.get("@"), angle + block.get("^")
     else:
@@ -162,11 +165,11 @@ def check_feed(control: RS274Control, block: Block) -> None:
         return
     if control.modal.feed_mode == FeedMode.INVERSE_TIME:
         if "F" not in block.values:
-            raise Fault(NO_FEED, "in inverse time mode (G93) every motion at feed needs its own F")
+            raise Fault(NO_FEED, "in inverse time mode (G93) every block with a motion at feed rate needs F")
     elif not control.modal.feed_given:
-        raise Fault(NO_FEED, "a motion at feed, and no feed (F) is set")
+        raise Fault(NO_FEED, "a motion at feed rate, but no feed rate (F) is set")
     elif control.modal.feed_mode == FeedMode.PER_REVOLUTION and control.modal.speed == 0.0:
-        raise Fault(NO_FEED, "a feed per revolution (G95), and no spindle speed (S) is set")
+        raise Fault(NO_FEED, "a feed rate per revolution (G95), but no spindle speed (S) is set")
 
 
 BAD_MOTION = "NCF221"
@@ -174,12 +177,12 @@ MACHINE_COORDINATES = Passing(Pass.MACHINE_COORDINATES, "machine coordinates (G5
 REFERENCE_POINT = "reference point ({})"
 PROBING = Passing(Pass.PROBING, "probing")
 DWELL = Passing(Pass.DWELL, "dwell")
-AFTER_G53 = "where the axis {} stands after G53 in incremental coordinates (G91) differs from control to control"
-AFTER_PROBING = "where the axis {} stands after probing is known only at run time"
-WITH_CANCEL = "what a word {} beside G80 does differs from control to control: say G0 or G1 in the block"
+AFTER_G53 = "the position of the axis {} after G53 in incremental coordinates (G91) depends on the control"
+AFTER_PROBING = "the position of the axis {} after probing is known only at run time"
+WITH_CANCEL = "what a word {} in a block with G80 does depends on the control: program G0 or G1 in the block"
 SECOND_POINT = 300
-AFTER_REFERENCE = "where the axis {} stands after the reference point is approached is not given"
-AFTER_CYCLE = "where the axis {} stands after a turning cycle is not followed"
+AFTER_REFERENCE = "the position of the axis {} after the approach to the reference point is not given"
+AFTER_CYCLE = "the position of the axis {} after a turning cycle is not known"
 NO_CODE = -2
 """Motion code of blocks with axis words before any motion code is in force."""
 
@@ -234,7 +237,7 @@ def in_machine_coordinates(control: RS274Control, block: Block, code: int) -> No
     else:
         modal = code
     if control.modal.incremental and control.rules.strict:
-        raise Fault(BAD_MOTION, "G53 cannot be used with incremental coordinates (G91)")
+        raise Fault(BAD_MOTION, "G53 is not allowed with incremental coordinates (G91)")
     if code:
         check_feed(control, block)
     control.modal.motion = modal
@@ -327,9 +330,9 @@ def probe(control: RS274Control, block: Block, code: int) -> None:
     """G38.2 to G38.5, and G31 of ISO controls: move towards the words until the probe switches."""
     if control.rules.strict:
         if not control.modal.feed_given:
-            raise Fault("NCF225", "probing, and no feed (F) is set")
+            raise Fault("NCF225", "probing, but no feed rate (F) is set")
         if control.modal.feed_mode == FeedMode.PER_REVOLUTION:
-            raise Fault(BAD_MOTION, "probing needs a feed per minute (G94)")
+            raise Fault(BAD_MOTION, "probing needs a feed rate per minute (G94)")
     if code != ONE_SHOT_PROBE:
         control.modal.motion = code
     end = destination(control, block)
@@ -339,7 +342,7 @@ def probe(control: RS274Control, block: Block, code: int) -> None:
     target, unknown = end.target, end.unknown
     moved = [index for index in range(N_LETTERS) if target[index] != control.position[index] or index in unknown]
     if control.rules.strict and code % 2 == 0 and not moved:
-        raise Fault(BAD_MOTION, "the probe starts at the end of its motion")
+        raise Fault(BAD_MOTION, "the probing motion has no length: it starts at its end point")
     spatial = 7 if control.is_rotated and block.axes & 7 else 0
     named = [index for index in moved if (block.axes | spatial) >> index & 1]
     touched = MotionEnd(target, unknown | {index: AFTER_PROBING for index in named if index in control.axis_indices})
@@ -375,7 +378,7 @@ def refused(control: RS274Control, block: Block, code: int) -> None:
     if code in (330, 331, 760):
         control.modal.motion = code
         if control.rules.strict and control.modal.spindle == 5:
-            raise Fault(BAD_MOTION, f"the spindle does not turn in {REFUSALS[code]}")
+            raise Fault(BAD_MOTION, f"the spindle is not on for {REFUSALS[code]}")
     elif code in (50, 51):
         check_feed(control, block)
     else:
@@ -390,7 +393,7 @@ def refused(control: RS274Control, block: Block, code: int) -> None:
 def end_spline(control: RS274Control, block: Block, code: int) -> None:
     """G5.3: end the spline that the G5.2 blocks described."""
     if control.modal.motion != 52:
-        raise Fault(BAD_MOTION, "G5.3 ends a spline, and none was begun with G5.2")
+        raise Fault(BAD_MOTION, "G5.3 ends a spline, but no G5.2 has started one")
     control.modal.motion = -1
 
 

@@ -51,12 +51,12 @@ FARTHEST = 2**31
 def whole(value: float, what: str) -> int:
     """A number that must be an integer, such as an index or a label; LinuxCNC accepts a deviation of 0.0001."""
     if not abs(value) < FARTHEST:
-        raise Fault(ARITHMETIC, f"{what} is {value:g}, and no control counts so far")
+        raise Fault(ARITHMETIC, f"{what} is {value:g}, which is too large")
     nearest = math.floor(value)
     if value - nearest > 0.9999:
         return nearest + 1
     if value - nearest > 0.0001:
-        raise Fault(ARITHMETIC, f"{what} is {value:g}, and must be a whole number")
+        raise Fault(ARITHMETIC, f"{what} is {value:g}, but must be a whole number")
     return nearest
 
 
@@ -228,7 +228,7 @@ class NumberedParameters:
             raise Fault(OUT_OF_RANGE, f"there is no parameter #{key}", f"they are #1 to #{N_PARAMETERS - 1}")
         if key in READ_ONLY or key in self.predefined:
             name = f"#{key}" if isinstance(key, int) else f"#<{key}>"
-            raise Fault(READ_ONLY_FAULT, f"{name} cannot be assigned to: the control sets it itself")
+            raise Fault(READ_ONLY_FAULT, f"{name} cannot be set: the control sets it itself")
 
     def store_of(self, key: Key) -> Store:
         """The store of a parameter."""

@@ -222,7 +222,7 @@ def take_aliases(plan: RS274Plan, rules: Rules) -> None:
         family = {own: address for address, (own, _) in given.items() if own is not None}
         untouched = plan.letters - family.keys()
         if untouched & given.keys():
-            plan.fault = Fault(CONFLICT, f"{min(untouched & given.keys())} is no word of {code[0]}{code[1] / 10:g}")
+            plan.fault = Fault(CONFLICT, f"{min(untouched & given.keys())} is not a word of {code[0]}{code[1] / 10:g}")
             return
         plan.literals = tuple((family.get(address, address), slot) for address, slot in plan.literals)
         plan.pointless = tuple(family.get(address, address) for address in plan.pointless)
@@ -273,7 +273,7 @@ def flow_line(item: OWordLine, rules: Rules) -> FlowLine:
 
 def assignment(item: Assignment, rules: Rules) -> tuple[int | str | Evaluate, Evaluate, Span]:
     """Target and value of an assignment: a name as text, a number as function; and the place."""
-    assert isinstance(item.target, NamedParameter | NumberedParameter), "this family has no arrays"
+    assert isinstance(item.target, NamedParameter | NumberedParameter), "this dialect has no arrays"
     target = item.target.name if isinstance(item.target, NamedParameter) else rules.compiled(item.target.index, "")
     return target, rules.compiled(item.value, ""), item.span
 

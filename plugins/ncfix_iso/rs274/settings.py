@@ -110,7 +110,9 @@ def unknown_code(control: RS274Control, code: int, *, moving: bool) -> None:
     """Handle an unknown G code, which may change coordinates or move axes."""
     name = f"G{code / 10:g}"
     if control.rules.strict:
-        raise Fault("NCF227", f"{name} is not a code of LinuxCNC", "if the machine remaps it, ncfix cannot follow it")
+        raise Fault(
+            "NCF227", f"{name} is not a code of LinuxCNC", "if the machine remaps it, ncfix cannot know what it does"
+        )
     control.refuse_after(code, moving=moving)
 
 
@@ -127,7 +129,7 @@ def spindle_or_state(control: RS274Control, block: Block, code: int) -> None:
         case 720:
             state = control.saved[-1]
             if state is None:
-                raise Fault(BAD_SETTING, "M72 restores a state, and none was saved with M70")
+                raise Fault(BAD_SETTING, "M72 restores a state, but M70 has saved none")
             restore(control, state.modal)
         case _:
             control.modal.spindle = 5 if code == 190 else code // 10
@@ -146,9 +148,9 @@ def restore(control: RS274Control, saved: Modal) -> None:
 
 BAD_LENGTH = "NCF224"
 
-BY_H_ALONE = "what H without G43 makes of the tool length differs from control to control"
-AFTER_H_ALONE = "where the axis {} stands after H without G43 differs from control to control"
-DIFFERS = "what G10 L{} sets differs from control to control (--dialect says which one it is)"
+BY_H_ALONE = "whether H without G43 changes the tool length depends on the control"
+AFTER_H_ALONE = "the position of the axis {} after H without G43 depends on the control"
+DIFFERS = "what G10 L{} sets depends on the control (--dialect says which one it is)"
 
 
 # -- tool numbers -----------------------------------------------------------------------------------------------------
@@ -181,7 +183,7 @@ def tool_offset(control: RS274Control, block: Block, code: int) -> None:
     other controls.
     """
     if code == 431 and "H" in block.values and not control.rules.strict:
-        control.refuse_rest("G43.1 with H is a length along the turned tool on some controls")
+        control.refuse_rest("on some controls G43.1 with H is a tool length along the tilted tool")
     tool, number, lacking = offset_of(control, block, code)
     if control.resume(BY_H_ALONE):
         control.lose((X, Y, Z) if control.tcp else (Z,), AFTER_H_ALONE)
@@ -192,7 +194,7 @@ def tool_offset(control: RS274Control, block: Block, code: int) -> None:
     if "H" in block.unknown or (code in DYNAMIC_OFFSETS and block.unknown):
         control.refuse_rest("a tool length offset is known only at run time")
     if code == 435:
-        control.refuse_rest("the tool direction is given by I J K (G43.5)")
+        control.refuse_rest("I J K give the tool direction (G43.5)")
     across = (X, Y) if on and not (control.tcp and control.stands_square()) else ()
     if on or control.tcp:
         switch(control, tool, on, number)
@@ -255,7 +257,7 @@ def numbered_tool(control: RS274Control, block: Block) -> int:
 def length_of(control: RS274Control, number: int) -> float:
     """The length of a tool for an offset, mm."""
     if number in control.tools.measured:
-        control.refuse_rest(f"the length of tool {number} is measured at run time")
+        control.refuse_rest(f"the program measures the length of tool {number} at run time")
     if number in control.tools.lengths:
         return control.tools.lengths[number]
     if number == 0 and not control.rules.strict:

@@ -43,14 +43,14 @@ REFERENCES = {"G28": 5161, "G30": 5181}
 """Parameters with X of the reference points."""
 
 BAD_G10 = "NCF222"
-NO_PRESET = "G92.1 that names no axis, another value than zero, or stands under a tool offset is not followed"
-COUNTED_ON = "what G92 counts from in G91 differs from control to control"
-ON_TOP = "whether a shift (G52) is added to the one in force in G91 differs from control to control"
-WHOSE_SHIFT = "whether a shift (G52) of the axis {} is one of all work offsets differs from control to control"
-TURNED_WITH_SHIFT = "where {} stands after a rotation while G92 is active differs from control to control"
+NO_PRESET = "G92.1 without an axis, with a value other than zero, or under a tool offset is not supported"
+COUNTED_ON = "from which position G92 counts in G91 depends on the control"
+ON_TOP = "whether a shift (G52) in G91 is added to the one in force depends on the control"
+WHOSE_SHIFT = "whether a shift (G52) of the axis {} applies to all work offsets depends on the control"
+TURNED_WITH_SHIFT = "the position of {} after a rotation while G92 is active depends on the control"
 TURNED = "turned"
-MOVED_WHILE_TURNED = "what {} does while coordinates are turned, mirrored or tilted differs from control to control"
-AFTER_TURNED = "where the axis {} stands after an origin that was moved in turned coordinates is not known"
+MOVED_WHILE_TURNED = "what {} does while coordinates are rotated, mirrored or tilted depends on the control"
+AFTER_TURNED = "the position of the axis {} after a shift of the origin in rotated coordinates is not known"
 RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
 SHIFT_ACTIVE = 5210
 UNFOLLOWED = {
@@ -82,7 +82,7 @@ SAME_PLACE = 1e-6
 
 ROTATED = "rotation"
 """Mode that suspends motions while a rotation in the plane is uncertain, until G69."""
-AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
+AFTER_UNFOLLOWED = "the position of the axis {} after coordinates that are not supported is not known"
 
 
 def first_parameter(system: int) -> int:
@@ -269,11 +269,11 @@ def set_system(control: RS274Control, block: Block, *, at_position: bool) -> Non
     """G10 L2 and L20: the axis words are the new offset, or the coordinates that the present position gets."""
     system = whole(block.get("P"), "P of G10") or control.modal.system
     if not 1 <= system <= len(SYSTEM_NAMES):
-        raise Fault(BAD_G10, f"there is no coordinate system P{system}", f"P is 0 to {len(SYSTEM_NAMES)}")
+        raise Fault(BAD_G10, f"there is no work offset P{system}", f"P is 0 to {len(SYSTEM_NAMES)}")
     first = first_parameter(system)
     if "R" in block.values:
         if at_position:
-            raise Fault(BAD_G10, "R cannot be given with G10 L20")
+            raise Fault(BAD_G10, "R is not allowed with G10 L20")
         control.parameters.assign(first + 9, block.value("R"))
     origin = stored(control, first)
     if at_position:
@@ -441,7 +441,7 @@ def uncertain(control: RS274Control, block: Block) -> str:
     centred = any(LETTERS[index] in block.values for index in control.modal.plane.pair)
     again = control.frames.rotation.rotation != IDENTITY and not control.rules.adds_rotations
     if control.modal.incremental and (centred or again):
-        return "what the words of a rotation (G68) count from in G91 differs from control to control"
+        return "from which position the words of a rotation (G68) count in G91 depends on the control"
     pair = control.modal.plane.pair
     about_here = [index for index in pair if LETTERS[index] not in block.values]
     control.use_start_positions(about_here)
@@ -450,7 +450,7 @@ def uncertain(control: RS274Control, block: Block) -> str:
     here, turned = control.program_position(), control.frames.rotation
     before = [turned.shift[index] + dot(turned.rotation[index], here[:3]) for index in about_here]
     if any(abs(place - here[index]) > SAME_PLACE for place, index in zip(before, about_here, strict=True)):
-        return "what a rotation (G68) that names no centre turns about while another is in force is not certain"
+        return "the centre of a rotation (G68) without centre words, while another rotation is in force, is not certain"
     return ""
 
 
@@ -474,6 +474,6 @@ def unfollowed(control: RS274Control, block: Block, code: int) -> None:
         if code == 510 and alone and control.rules.din_units:
             return  # in DIN/ISO of a TNC the next tool; elsewhere by a factor of the control
         key, words = UNFOLLOWED[code]
-        control.suspend(key, f"{words} is in force, which ncfix does not follow")
+        control.suspend(key, f"{words} is in force, which ncfix does not support")
     elif control.resume(ENDS[code]):
         control.lose(control.axis_indices, AFTER_UNFOLLOWED)

@@ -330,7 +330,7 @@ def check_repeats(parsed: Parsed) -> None:
     seen: set[str] = set()
     for word in parsed.template.words:
         if word.address in seen and word.address in ONCE:
-            raise BlockError("NCF117", f"the word {word.address} stands twice", start_of(word, parsed))
+            raise BlockError("NCF117", f"the word {word.address} appears twice", start_of(word, parsed))
         seen.add(word.address)
 
 

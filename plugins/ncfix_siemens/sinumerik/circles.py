@@ -15,7 +15,7 @@ from ncfix_siemens.sinumerik.destination import NO_POLE, destination, doubtful_p
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, CT_LEFT, CT_RIGHT, BlockWordValues
 
-NO_HEADING = "in which direction the motion before this arc (CT) ends is not known"
+NO_HEADING = "the direction at the end of the motion before this arc (CT) is not known"
 TURNS_AT_RUNTIME = "the turns of the arc (CT) are known only at run time"
 STRAIGHT = 1e-9
 """Sine of the angle between heading and chord below which a CT arc is a straight line."""
@@ -41,7 +41,10 @@ def tangential(control: Sinumerik, words: BlockWordValues) -> None:
     left = ahead[0] * chord[1] - ahead[1] * chord[0]
     if abs(left) <= STRAIGHT * math.hypot(*ahead) * math.hypot(*chord):
         if along <= 0.0 and any(chord):
-            raise Fault(ARC_FAULT, "the arc (CT) would have to turn back on the spot: its end lies straight behind")
+            raise Fault(
+                ARC_FAULT,
+                "the arc (CT) is not possible: its end is exactly opposite to the direction of the motion before it",
+            )
         control.go(MotionKind.FEED, words, end, CT_LEFT)
         return
     away = (chord[0] ** 2 + chord[1] ** 2) / (2 * left)
@@ -55,15 +58,18 @@ CENTRE_AT_RUNTIME = "the centre of the arc is known only at run time"
 VIA_AT_RUNTIME = "the intermediate point of the arc is known only at run time"
 POLAR_ARC = "an arc (CT) in polar coordinates"
 """Its end is said in Cartesian coordinates (SINUMERIK ONE, NC Programming, 12/2019: CT)."""
-POLAR_AND_CENTRE = "an arc about the pole (AP, RP) that has a centre or radius, too"
+POLAR_AND_CENTRE = "an arc about the pole (AP, RP) that also has a centre or radius"
 DIAMETERS = "an absolute centre or intermediate point of an arc while X is a diameter ({})"
 VIA = ("I1", "J1", "K1")
 OF_ARCS = frozenset({*CENTRE_LETTERS, "CR", "AR", "TURN"})
 OF_CIP = frozenset({*VIA, "TURN"})
-NOT_TAKEN = "{} takes no word {}: the control would stop, or makes a path of it that is not followed"
-TWICE = "{} says by {} and {} where the arc lies: which of them counts is not sure"
-ACROSS = "{} says by {} where its centre lies across the plane, and by {} where the arc lies: what counts is not sure"
-NO_END = "CIP without an end point: no circle is given by two points"
+NOT_TAKEN = "{} does not allow the word {}: the control would stop, or make a path that ncfix does not support"
+TWICE = "{} defines the arc both by {} and by {}: which one the control uses is not certain"
+ACROSS = (
+    "{} gives a centre word normal to the plane ({}) and defines the arc by {}: which one the control uses is not "
+    "certain"
+)
+NO_END = "CIP without an end point: two points do not define a circle"
 FLAT = 1e-9
 """Relative area of the triangle of three points below which they are collinear."""
 
@@ -87,7 +93,9 @@ def misled(control: Sinumerik, words: BlockWordValues, name: str, taken: frozens
     ended = any(words.axes >> index & 1 for index in plane.pair)
     if "CR" in named and (centre or "AR" in named):
         return TWICE.format(name, "CR", (centre or ["AR"])[0])
-    return TWICE.format(name, "AR", "an end point beside its centre") if "AR" in named and centre and ended else ""
+    return (
+        TWICE.format(name, "AR", "an end point in addition to its centre") if "AR" in named and centre and ended else ""
+    )
 
 
 def arc(control: Sinumerik, words: BlockWordValues, code: int) -> None:
@@ -174,7 +182,7 @@ def centre_words(control: Sinumerik, words: BlockWordValues, plane: Plane) -> Po
 def centre_from_angle(chord: Point, degrees: float, *, clockwise: bool) -> Point:
     """The centre of an arc given by its end and opening angle (AR)."""
     if not 0.0 < degrees < 360.0:
-        raise Fault(ARC_FAULT, f"AR is {degrees:g}, and must be between 0 and 360 degrees")
+        raise Fault(ARC_FAULT, f"AR is {degrees:g}, but must be between 0 and 360 degrees")
     radius = math.hypot(*chord) / (2 * math.sin(math.radians(degrees) / 2))
     return centre_from_radius(chord, radius if degrees <= 180.0 else -radius, clockwise=clockwise)
 
@@ -218,7 +226,7 @@ def through_point(control: Sinumerik, words: BlockWordValues, code: int) -> None
         control.go(MotionKind.FEED, words, end, code, refusal=why)
         return
     if end.unknown or control.unknown:
-        control.go(MotionKind.FEED, words, end, code, refusal="where the arc (CIP) begins or ends is not known")
+        control.go(MotionKind.FEED, words, end, code, refusal="the start or end of the arc (CIP) is not known")
         return
     start, finish = tuple(control.position[:3]), tuple(end.target[:3])
     if not words.axes & 0b111 and not {"AP", "RP"} & words.values.keys():

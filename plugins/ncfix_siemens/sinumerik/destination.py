@@ -11,26 +11,26 @@ from ncfix.control.tcp import EQUAL_TOLERANCE, converted, led_in_machine
 from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, HALF_A_TURN, POLAR, SHORTEST_WAY, TURNING, BlockWordValues
 
-RUNTIME = "where the axis {} stands is known only at run time"
+RUNTIME = "the position of the axis {} is known only at run time"
 RADIUS = "an increment of X as a radius while absolute ones are diameters (DIAM90)"
 BAD_POLAR = "NCF223"
 IMPOSSIBLE = "NCF221"
 POLAR_DIAMETER = "polar coordinates (AP, RP) while X is a diameter"
-NO_POLE = "polar coordinates (AP, RP) while no pole is known"
-TWICE = "polar coordinates (AP, RP) beside {} in the plane: which of them counts is not sure"
-NO_RADIUS = "a polar radius (RP) of zero: the control takes the distance from the pole instead"
-ASIDE = "an angle (AP) that is left out, or an increment of AP or RP, where the axes have left the last polar position"
+NO_POLE = "polar coordinates (AP, RP) while the pole is not known"
+TWICE = "polar coordinates (AP, RP) together with {} in the plane: which one the control uses is not certain"
+NO_RADIUS = "a polar radius (RP) of zero: the control uses the distance from the pole instead"
+ASIDE = "AP is missing, or AP or RP is an increment, after the axes have left the last polar position"
 NEAR_POLE = 1e-6
 """mm"""
 STILL = 1e-9
 """Largest difference of equal angles, rad."""
 INCREMENT_IN_PLANE = (
-    "where the axis {} stands after increments in machine coordinates in a swivelled plane is not followed"
+    "the position of the axis {} after increments in machine coordinates in a tilted plane is not known"
 )
 TOOL_OFF = "$mn_g53_toolcorr"
 """Machine data 10760: 0, the tool stays on in machine coordinates; 1, it is taken off. A control may have either."""
 TOOL_ON_OR_OFF = (
-    "where the axis {} stands after SUPA or G53 with a tool length on is for machine data: "
+    "the position of the axis {} after SUPA or G53 with a tool length in force depends on machine data: "
     f'variables."{TOOL_OFF.upper()}" = 0 (it stays on) or 1 (it does not) in the setup file; or D0 in that block'
 )
 
@@ -74,7 +74,7 @@ def place(control: Sinumerik, words: BlockWordValues, letter: str, program: Vect
         program[index] += step
     elif form in TURNING:
         if not control.rotary[index]:
-            raise Fault(IMPOSSIBLE, f"{form.upper()} is for rotary axes, and {letter} is none")
+            raise Fault(IMPOSSIBLE, f"{form.upper()} is for rotary axes, but {letter} is not one")
         program[index] = turned(form, program[index], step, known=index not in control.lost_in_frame())
         control.over += (index,)
         if index in control.lost_in_frame():
@@ -211,7 +211,7 @@ def machine_destination(control: Sinumerik, words: BlockWordValues) -> MotionEnd
     of the tip.
     """
     if POLAR & words.values.keys():
-        raise Fault(BAD_POLAR, "polar coordinates do not go with machine coordinates")
+        raise Fault(BAD_POLAR, "polar coordinates are not allowed with machine coordinates")
     if control.tcp and not (control.modes.transformed or control.setup.tcp):
         end = led_in_machine(control, *axes_of_machine(control, words))
         return MotionEnd(end.target, end.unknown, control.along_frame(end.unknown), end.in_machine)

@@ -100,7 +100,7 @@ class SinumerikFlattener(Flattener):
         if isinstance(value, Unknown) and not any(has_value(variables, name) for name in names_in(item.value)):
             return None
         if isinstance(value, Unknown) or len(known) < len(places) or step.value is None:
-            raise Fault(RUNTIME, f"what {step.name.upper()} is set to is known only at run time")
+            raise Fault(RUNTIME, f"the value of {step.name.upper()} is known only at run time")
         return self.replaced(item.span, f"{self.target(step.name, known)}={assigned(value)}")
 
     def target(self, name: str, places: tuple[float, ...]) -> str:

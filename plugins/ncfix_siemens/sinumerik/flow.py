@@ -17,7 +17,9 @@ from ncfix_siemens.sinumerik.plans import AssignedVariable, Branching
 from ncfix_siemens.sinumerik.state import Sinumerik
 from ncfix_siemens.sinumerik.unit import BROKEN, SinumerikUnit
 
-SKIPPED_PART = "a part of this structure is skipped by block delete (/): whether the control finds it there is not sure"
+SKIPPED_PART = (
+    "block delete (/) skips a part of this control structure: whether the control still finds it is not certain"
+)
 
 
 LABELS = re.compile(r"\s*((?!N\d+\b)[A-Z_]\w*)\s*:\s*((?!N\d+\b)[A-Z_]\w*)\s*", re.IGNORECASE)

@@ -18,23 +18,28 @@ FRAME_AT_RUNTIME = "a frame ({}) is known only at run time"
 UNEQUAL = "a scale that differs from axis to axis ({})"
 ROTARY_FRAME = "a {} of a rotary axis"
 WHO_CHANGES = (
-    "whether T by itself changes the tool is not certain: a name that ncfix does not know has followed a T before"
+    "whether T alone changes the tool is not certain: after an earlier T the program calls a name that ncfix does not "
+    "know"
 )
 UNSAID = (
-    "whether X is a radius or a diameter is not said in a program that turns (G96): with DIAMOF or DIAMON, or by "
+    "whether X is a radius or a diameter is not given in a turning program (G96): program DIAMOF or DIAMON, or set "
     f'variables."{RESET_OF_DIAMETER}" = 1 or 2 in the setup file'
 )
-DIAMETER_SHIFT = "a shift of X while X is a diameter ({}) is in force: which of the two it is, machine data say"
-MIXED_SHIFTS = "G{} after a shift (ATRANS) in a turned or scaled frame is in force"
-FINE_STAYS = "{} after G59: whether what G59 has set stays is not certain"
-AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
+DIAMETER_SHIFT = (
+    "a shift of X while X is a diameter ({}) is in force: machine data decide whether it is a radius or a diameter"
+)
+MIXED_SHIFTS = "G{} after a shift (ATRANS) in a rotated or scaled frame is in force"
+FINE_STAYS = "{} after G59: whether the shift of G59 stays in force is not certain"
+AFTER_UNFOLLOWED = "the position of the axis {} after coordinates that are not supported is not known"
 CARRIED = "NCF255"
 MEASURED = "NCF259"
 INCH_MACHINE = "$mn_scaling_system_is_metric"
 """Machine data 10240: 0, the machine counts in inches. So do its feeds under G70 and G71, whatever these say."""
 BASIC = "NCF282"
-ADDED = "G500 has an offset in the setup, which a control adds to {0} if it is a basic offset: {0} is taken as given"
-LIKE_IT = "give about what the probe finds: tenths of a millimetre matter little"
+ADDED = (
+    "the setup gives G500 an offset, which the control adds to {0} if it is a basic offset; ncfix uses {0} without it"
+)
+LIKE_IT = "give approximately the offset that the probe finds: tenths of a millimetre have little effect"
 LENGTH_ACROSS = "$sc_tool_length_const"
 PLANE_LENGTH = (
     "in this plane the control adds the tool length along another axis, unless $SC_TOOL_LENGTH_CONST is 17: "
@@ -95,20 +100,20 @@ def scaling(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
         return WORLD, ""
     if set(plain) >= {"X", "Y", "Z"} and len(set(plain.values())) == 1 and len(plain) == 3:
         return Affine(scale=plain["X"]), ""
-    return WORLD, UNEQUAL.format("SCALE") + " is in force, which ncfix does not follow"
+    return WORLD, UNEQUAL.format("SCALE") + " is in force, which ncfix does not support"
 
 
 def mirroring(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
     """The frame of MIRROR, which reverses the named axes."""
     letters = "".join(axis_values(words))
     if set(letters) - set("XYZ"):
-        return WORLD, ROTARY_FRAME.format("mirroring (MIRROR)") + " is in force, which ncfix does not follow"
+        return WORLD, ROTARY_FRAME.format("mirroring (MIRROR)") + " is in force, which ncfix does not support"
     return Affine(rotation=mirrored(letters)), ""
 
 
 def by_solid_angles(control: Sinumerik, words: BlockWordValues) -> tuple[Affine, str]:
     """ROTS: not followed."""
-    return WORLD, "a frame by solid angles (ROTS) is in force, which ncfix does not follow"
+    return WORLD, "a frame by solid angles (ROTS) is in force, which ncfix does not support"
 
 
 FRAMES: dict[str, Callable[[Sinumerik, BlockWordValues], tuple[Affine, str]]] = {
@@ -174,9 +179,13 @@ def settable(control: Sinumerik, code: int) -> None:
     name = f"G{code // 10}"
     control.modes.carried = ""
     if control.resume("measured"):
-        control.warn(MEASURED, f"{name} after measuring is taken to be what the setup gives", LIKE_IT)
+        control.warn(MEASURED, f"{name} after measuring: ncfix uses the offset of the setup", LIKE_IT)
     if name != NO_SYSTEM and any(control.setup.work_offsets.get(NO_SYSTEM, {}).values()):
-        control.warn(BASIC, ADDED.format(name), f"give {name} with all that acts, and G500 what acts without it")
+        control.warn(
+            BASIC,
+            ADDED.format(name),
+            f"give the whole offset for {name}, and for G500 the offset that is in force without it",
+        )
     control.select(name)
 
 
@@ -185,8 +194,11 @@ def mind_carried(control: Sinumerik) -> None:
     frames, name = control.frames, control.modes.carried
     control.modes.carried = ""
     if name and any(frames.datum.shift):
-        text = f"{frames.name} is taken to stay in force over {name}: where machine data take it out, nothing is right"
-        control.warn(CARRIED, text, f"program {frames.name} anew after {name}")
+        text = (
+            f"{name}: ncfix assumes that {frames.name} stays in force; if machine data cancel it, all positions are "
+            "wrong"
+        )
+        control.warn(CARRIED, text, f"program {frames.name} again after {name}")
 
 
 def feed_mode(control: Sinumerik, code: int) -> None:

@@ -69,13 +69,13 @@ NOT_UNDERSTOOD = "NCF250"
 SYNCHRONOUS = "NCF251"
 MAIN = frozenset({"", "MPF"})
 """Kinds of main programs; SPF are subprograms, CYC and INI no programs to follow."""
-CONTOUR = "the contour that {} mills has to stay what it is, and cannot be written out flat"
+CONTOUR = "the contour that {} mills must stay unchanged and cannot be written out flat"
 PROGRAM_ENDS = frozenset({20, 300, 170})
 TOOL_CHANGE = re.compile(rb"(?im)^[^;\n]*(?<![A-Z0-9_])M[ \t]*=[ \t]*0*6(?![\d.])")
 PERHAPS = re.compile(rb"[Mm][ \t]*=[ \t]*0*6")
 """A part of every match of `TOOL_CHANGE`, whose search is faster."""
 
-AFTER_POSITIONING = "where the axis {} stands after it was positioned by itself is not followed"
+AFTER_POSITIONING = "the position of the axis {} after positioning by itself (POS) is not known"
 POLYNOMIALS = UNFOLLOWED_MOTIONS[MOTIONS["poly"]]
 SPINDLE = re.compile(r"S\d+")
 DESELECTED = frozenset({"tcarr", "cutmod"})
@@ -270,7 +270,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
             return False
         if turn.contour is not None:
             if self.in_parts:
-                raise NotInPartsError("a contour stands elsewhere in the program")
+                raise NotInPartsError("a contour is elsewhere in the program")
             if self.watcher is not None:
                 from ncfix.control.flatten import NOT_FLAT
 
@@ -300,7 +300,7 @@ class SinumerikInterpreter(Interpreter[SinumerikUnit]):
         """Execute text that is not parsed: a block not understood, a macro, a synchronized action."""
         control = self.control
         if is_statement(plan) or "macro" in plan.opaque:
-            why = f"the block {say(text)} is not understood, and may move axes or change coordinates"
+            why = f"the block {say(text)} is unknown and may move axes or change coordinates"
             control.refuse_rest(why)
             control.warn(NOT_UNDERSTOOD, control.refusal, "all motions after it are refused")
         if "synchronized" in plan.opaque and is_harmless(text):
@@ -349,7 +349,7 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None:
         lost = control.lost_in_frame() | control.along_frame(dict.fromkeys(gone, AFTER_POSITIONING))
         control.go(MotionKind.RAPID, still, control.here(lost), 0, refusal=why)
     else:
-        control.refuse_rest(f"{why} is not followed")
+        control.refuse_rest(f"{why} is not supported")
 
 
 def follow_polynomial(control: Sinumerik, turn: Turn, step: AssignedVariable, letter: str | None) -> None:
@@ -377,6 +377,6 @@ def note_letting(control: Sinumerik, turn: Turn, step: AssignedVariable) -> None
     elif step.name in PROBING:
         turn.special.add("meas")
     elif step.index and step.name.upper() in INDEX:
-        control.refuse_rest(f"{step.name.upper()}[..] is not followed")
+        control.refuse_rest(f"{step.name.upper()}[..] is not supported")
     elif step.name in UNSEEN and step.index:
-        control.refuse_rest(f"{UNSEEN[step.name]} is not followed")
+        control.refuse_rest(f"{UNSEEN[step.name]} is not supported")

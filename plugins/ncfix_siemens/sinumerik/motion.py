@@ -51,15 +51,15 @@ def watch(control: Sinumerik, text: str) -> None:
 MACHINE = "machine coordinates ({})"
 MEASURING = Passing(Pass.PROBING, "measuring (MEAS)")
 DWELL = Passing(Pass.DWELL, "dwell")
-AFTER_MEASURING = "where the axis {} stands after measuring is known only at run time"
+AFTER_MEASURING = "the position of the axis {} after measuring is known only at run time"
 REFERENCE = {
     code: Passing(Pass.REFERENCE_POINT, words)
     for code, words in ((740, "reference point (G74)"), (750, "fixed point (G75)"), (7510, "fixed point (G751)"))
 }
-AFTER_REFERENCE = "where the axis {} stands after a reference or fixed point is not given"
+AFTER_REFERENCE = "the position of the axis {} after a reference or fixed point is not given"
 SOFT_APPROACH = frozenset({1470, 1480, 2470, 2480, 3470, 3480})
 BY_ANGLE = "a contour that is given by an angle (ANG)"
-AFTER_APPROACH = "where the axis {} stands after a soft approach or retraction is not followed"
+AFTER_APPROACH = "the position of the axis {} after a soft approach or retraction is not known"
 CORNERS = frozenset({"RND", "CHF", "CHR"})
 """Words of a rounding or chamfer at the end of the block."""
 

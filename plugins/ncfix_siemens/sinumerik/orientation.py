@@ -44,24 +44,24 @@ from ncfix_siemens.sinumerik.vocabulary import ANGLES, NORMALS, OTHERS, VECTOR, 
 
 BAD_VECTOR = "NCF254"
 WAY = "NCF253"
-OTHERWISE = "state the rotary axes in the program if the control turns them otherwise"
-FROM_UNKNOWN = "where the axis {} stands before the tool is turned is not known"
-AT_RUNTIME = "the direction of the tool is known only at run time"
-NO_KINEMATICS = "the direction of the tool needs the kinematics of a machine with two rotary axes"
-NOT_ON = "a direction of the tool is given while TRAORI is not on"
-NOT_FOLLOWED = "the tool is oriented in another way than by rotary axes or a vector ({})"
-MIXED = "the direction of the tool is given in more than one way"
+OTHERWISE = "if the control uses other positions, program the rotary axes"
+FROM_UNKNOWN = "the position of the axis {} before the tool turns is not known"
+AT_RUNTIME = "the tool direction is known only at run time"
+NO_KINEMATICS = "the tool direction needs the kinematics of a machine with two rotary axes"
+NOT_ON = "a tool direction is programmed while TRAORI is not in force"
+NOT_FOLLOWED = "the program gives the tool direction in another form than rotary axes or a vector ({})"
+MIXED = "the program gives the tool direction in more than one way"
 MEANT = '"$MC_ORIENTATION_IS_EULER"'
 WHICH_ANGLES = (
-    "whether A2 B2 C2 are Euler or roll-pitch-yaw angles is for ORIEULER or ORIRPY to say, or machine data: "
+    "A2 B2 C2 without ORIEULER or ORIRPY: machine data decide whether they are Euler or roll-pitch-yaw angles: "
     f"`variables.{MEANT} = 1` (or 0) in the setup file"
 )
-IN_MACHINE = "a direction of the tool in machine coordinates (ORIMKS) while the program's are turned"
-ALONG_PATH = "the tool turns with the path ({})"
+IN_MACHINE = "a tool direction in machine coordinates (ORIMKS) while the coordinates of the program are rotated"
+ALONG_PATH = "the tool direction follows the path ({})"
 BY_AXES = "oriaxes"
 BY_PATH = "oripath"
 ON_CURVES = ("oricon", "oricurve", "oripath")
-BY_CURVE = "the tool turns on a cone, or after a curve ({})"
+BY_CURVE = "the tool turns on a cone or along a curve ({})"
 
 LONGEST = 1 << 10
 """Largest number of blocks of a stretch; directions behind the block that ends it were computed in vain."""
@@ -79,13 +79,13 @@ PLACES = {"fr": 0, "st": 2, "mode": 3, "before": 4, "angles": 7, "after": 10, "d
 """Indices of the arguments: retraction, state, mode, reference point, angles, zero point, direction."""
 
 SWIVEL = Passing(Pass.ALIGNMENT, "swivelling (CYCLE800)")
-UNFOLLOWED = "a tilted plane (CYCLE800{}) is in force, which ncfix does not follow"
+UNFOLLOWED = "a tilted plane (CYCLE800{}) is in force, which ncfix does not support"
 OVER_FRAME = (
-    "a programmed frame (TRANS, ROT, ...) was in force at CYCLE800, and whether it stays is for machine data: "
-    "take it out before"
+    "a programmed frame (TRANS, ROT, ...) was in force at CYCLE800, and machine data decide whether it stays: cancel "
+    "it before"
 )
 STILL = ", without turning the rotary axes"
-AFTER_SWIVEL = "where the axis {} stands after swivelling (CYCLE800) is not followed"
+AFTER_SWIVEL = "the position of the axis {} after swivelling (CYCLE800) is not known"
 
 
 def oriented(control: Sinumerik, words: BlockWordValues) -> None:
@@ -133,12 +133,14 @@ def by_direction(control: Sinumerik, words: BlockWordValues) -> str:
         return FROM_UNKNOWN.format(LETTERS[control.axis_indices[control.posture.pointing.columns[0]]])
     size = math.hypot(*wanted)
     if size < NO_LENGTH:
-        raise Fault(BAD_VECTOR, "the direction of the tool (A3 B3 C3) has no length")
+        raise Fault(BAD_VECTOR, "the tool direction (A3 B3 C3) is a vector of length zero")
     found = control.postures([dot(row, wanted) / size for row in control.rotation])
     if found is None or not found.ways:
-        raise Fault(BAD_VECTOR, "the rotary axes cannot point the tool in this direction")
+        raise Fault(BAD_VECTOR, "the rotary axes cannot turn the tool to this direction")
     if found.leaves_pole:
-        control.warn(WAY, f"the tool is taken to turn to {found}, the nearest of several ways", OTHERWISE)
+        control.warn(
+            WAY, f"ncfix assumes that the rotary axes turn to {found}, the nearest of several positions", OTHERWISE
+        )
     for index, angle in found.chosen.items():
         words.values[LETTERS[index]] = (angle - control.offset[index]) / DEGREE
         words.forms[LETTERS[index]] = "ac"
@@ -377,5 +379,9 @@ def turn_square(control: Sinumerik, plane: SwivelPlane) -> dict[int, float]:
     found = control.postures(normal_of(control.rotation), rules, (here[0], here[1]))
     if found is None or not found.ways:
         return {}
-    control.warn(WAY, f"CYCLE800 is taken to turn to {found}", "check it on the control: its swivel data decide")
+    control.warn(
+        WAY,
+        f"CYCLE800: ncfix assumes that the rotary axes turn to {found}",
+        "check this on the control: its swivel data decide",
+    )
     return found.chosen

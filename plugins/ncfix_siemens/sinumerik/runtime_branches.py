@@ -25,8 +25,8 @@ from ncfix_siemens.sinumerik.vocabulary import (
     BlockWordValues,
 )
 
-DECIDED_AT_RUNTIME = "which blocks are executed here is decided at run time"
-GIVE = ', by {}: variables."{}" in the setup file gives it a value'
+DECIDED_AT_RUNTIME = "which blocks are executed from here on is known only at run time"
+GIVE = ': it depends on {}; give the value as variables."{}" in the setup file'
 NO_MOTIONS = frozenset({40, 740, 750, 250, 260, 1100, 1110, 1120})
 MACHINE = frozenset({530, 1530})
 

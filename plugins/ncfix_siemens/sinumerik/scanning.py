@@ -149,12 +149,12 @@ def numbered(lines: list[str]) -> list[str]:
 def redirected(line: str, new: dict[int, int], old: list[int]) -> str:
     """A line with its jumps redirected to the new numbers."""
     if BY_TEXT.search(line.split(";")[0]):
-        raise RefusedError.of(NOT_NUMBERED, f"a jump may go to a number that is a text: {line.strip()[:40]}")
+        raise RefusedError.of(NOT_NUMBERED, f"a jump may use a text as its block number: {line.strip()[:40]}")
     code = SILENT.sub(lambda found: " " * len(found[0]), line)
     pieces, done = [], 0
     for place, number in targets(code):
         if old.count(number) > 1:
-            raise RefusedError.of(NOT_NUMBERED, f"a jump goes to N{number}, which stands there more than once")
+            raise RefusedError.of(NOT_NUMBERED, f"a jump goes to N{number}, which appears more than once")
         pieces += [line[done : place[0]], str(new.get(number, number))]
         done = place[1]
     return "".join([*pieces, line[done:]])
@@ -169,7 +169,9 @@ def targets(code: str) -> list[tuple[tuple[int, int], int]]:
     ]
 
 
-ALL_OR_NONE = "polar coordinates of which only one is written, where another block with such words has to stay"
+ALL_OR_NONE = (
+    "a block with only one polar coordinate depends on another block with polar coordinates that must stay unchanged"
+)
 
 
 def polar_words(template: Template) -> frozenset[str]:

@@ -51,11 +51,11 @@ DIAMETERS: Mapping[Value, str] = {1.0: "diamof", 2.0: "diamon", 3.0: "diam90"}
 
 FRAME_COUNTS, TOOL_COUNTS = "$sc_frame_offset_incr_prog", "$sc_tool_offset_incr_prog"
 UNSTEADY = (
-    "whether the increment takes along that {} has changed is for setting data: "
-    'variables."{}" = 0 in the setup file says that it does not'
+    'setting data decide whether this increment includes the change of {}: variables."{}" = 0 in the setup file means '
+    "that it does not"
 )
 
-TURNED_AWAY = "a rotary axis turns in a swivelled plane, which does not turn with it: CYCLE800 has to be called anew"
+TURNED_AWAY = "a rotary axis turns in a tilted plane, and the plane does not turn with it: call CYCLE800 again"
 
 TAKEN_ALONG = ("by machine coordinates",)
 """Reference of an axis in a rotated frame after a motion of a machine axis: different from every frame."""
@@ -176,7 +176,7 @@ class Sinumerik(ProgramControl):
     def restore(self, modal: Modal, modes: Modes, frames: FrameStack) -> None:
         """Restore the state before a subprogram with SAVE, except feed, spindle and transformations."""
         if frames.plane != self.frames.plane:
-            self.suspend("tilt", "a swivelled plane (CYCLE800) of a subprogram with SAVE, which may stay in force")
+            self.suspend("tilt", "a tilted plane (CYCLE800) of a subprogram with SAVE, which may stay in force")
         if not modal.compensated:
             self.end_compensation()
         now, self.modal, self.frames = self.modal, modal, replace(frames, plane=self.frames.plane)

@@ -48,11 +48,11 @@ from ncfix_siemens.sinumerik.vocabulary import (
 Find = Callable[[str], SinumerikUnit | None]
 
 UNKNOWN_CYCLE = "NCF252"
-WHERE_IT_IS = "if it is a subprogram, say where its file is: --subprograms DIR"
+WHERE_IT_IS = "if it is a subprogram, give the folder of its file with --subprograms DIR"
 TRANSFORMING = ("traori", "transmit", "tracyl", "traang", "tracon", "trafoo")
 """Prefixes of names of transformations by kinematic chains, such as `TRANSMIT_K`."""
 
-SECTION = "a section of a program is called (CALL BLOCK), which is not followed"
+SECTION = "ncfix does not support the call of a program section (CALL BLOCK)"
 CALLED_BY_TEXT = frozenset({"call", "extcall"})
 FILE = re.compile(r"(?:^|[/:])(?:_N_)?(?P<name>\w+?)(?:_(?:SPF|MPF)|\.(?:SPF|MPF))?$", re.IGNORECASE)
 """The name of a program in a text, perhaps with a path."""
@@ -62,7 +62,7 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
     """Call a subprogram, or a cycle of the control or the machine's builder."""
     if turn.modal:
         kind = "cycle" if MADE_BY_THE_CONTROL.fullmatch(step.name) else "subprogram"
-        control.suspend("cycle", f"the modal {kind} {step.name.upper()} is in force, which ncfix does not follow")
+        control.suspend("cycle", f"the modal {kind} {step.name.upper()} is in force, which ncfix does not support")
         return
     unit = find(step.name)
     if unit is not None:
@@ -70,7 +70,7 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
         turn.times = round(turn.words.get("P", 1.0))
         return
     if step.name.startswith(TRANSFORMING):
-        control.suspend(step.name, f"the transformation {step.name.upper()} is in force, which ncfix does not follow")
+        control.suspend(step.name, f"the transformation {step.name.upper()} is in force, which ncfix does not support")
         return
     if MADE_BY_THE_CONTROL.fullmatch(step.name):
         cycle(control, turn.words, step, modal=False)
@@ -92,7 +92,7 @@ def lose_arguments(control: Sinumerik, written: Iterable[Expression | None]) -> 
 def function(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """Note a function in an expression of the block that only the control can evaluate."""
     if step.name in UNFOLLOWED:
-        control.suspend(step.name, f"{UNFOLLOWED[step.name]} is in force, which ncfix does not follow")
+        control.suspend(step.name, f"{UNFOLLOWED[step.name]} is in force, which ncfix does not support")
     turn.handed += step.written
 
 
@@ -101,7 +101,7 @@ def ran_elsewhere(control: Sinumerik, name: str, *, changes_tool: bool) -> None:
 
     changes_tool  it may be the one that changes the tool
     """
-    text = f"{name} is not known: it is taken as a cycle that leaves coordinates as they are"
+    text = f"{name} is unknown: ncfix assumes a cycle that does not change coordinates"
     control.warn(UNKNOWN_CYCLE, text, WHERE_IT_IS)
     control.lose_all(AFTER_CYCLE)
     control.changed_by_cycle |= changes_tool
@@ -118,9 +118,9 @@ def call_by_text(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> N
     if unit is not None:
         turn.subprogram, turn.called, turn.times = unit, step, round(turn.words.get("P", 1.0))
         return
-    control.suspend(step.name, f"{UNFOLLOWED[step.name]} is in force, which ncfix does not follow")
-    told = f"the program {text}" if found else f"a program that {step.name.upper()} names at run time"
-    control.warn(UNKNOWN_CYCLE, f"{told} is not at hand: motions after it are refused", WHERE_IT_IS)
+    control.suspend(step.name, f"{UNFOLLOWED[step.name]} is in force, which ncfix does not support")
+    told = f"the program {text}" if found else f"a program whose name {step.name.upper()} gets at run time"
+    control.warn(UNKNOWN_CYCLE, f"{told} is not found: motions after it are refused", WHERE_IT_IS)
 
 
 def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
@@ -129,7 +129,7 @@ def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
     if "L" not in turn.words.values:
         return
     if turn.modal:
-        control.suspend("cycle", "a modal subprogram (MCALL L) is in force, which ncfix does not follow")
+        control.suspend("cycle", "a modal subprogram (MCALL L) is in force, which ncfix does not support")
         return
     if value is None:
         control.refuse_rest("which subprogram is called (L) is known only at run time")
@@ -144,18 +144,18 @@ def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
 CONFLICT = "NCF208"
 FRAMES_STAY = "$mn_frame_geoax_change_mode"
 FRAME_OVER = (
-    "a programmed frame (TRANS, ROT, ...) was in force at {}, and whether it stays is for machine data: "
-    'program it anew, or variables."$MN_FRAME_GEOAX_CHANGE_MODE" = 1 in the setup file'
+    "a programmed frame (TRANS, ROT, ...) was in force at {}, and machine data decide whether it stays: program it "
+    'again, or set variables."$MN_FRAME_GEOAX_CHANGE_MODE" = 1 in the setup file'
 )
 OTHER_TRANSFORMATION = "NCF257"
 SWITCHED_ON = (
-    "whether CYCLE832 switches TRAORI on depends on the version of the control: "
-    "older ones take that from its second argument"
+    "whether CYCLE832 switches TRAORI on depends on the version of the control: older versions read it from the "
+    "second argument"
 )
 ADDITIVE = "an additive tool offset (DL) is in force, whose value is in the control"
-AFTER_ADDITIVE = "where the axis {} stands after an additive tool offset (DL) is not known"
-RETURNS_ELSEWHERE = "a subprogram leads back to another block than that behind its call (RET), which is not followed"
-AFTER_RESET = "where the axis {} stands after ORIRESET is for machine data"
+AFTER_ADDITIVE = "the position of the axis {} after an additive tool offset (DL) is not known"
+RETURNS_ELSEWHERE = "ncfix does not support a return to another block than the one after the call (RET)"
+AFTER_RESET = "the position of the axis {} after ORIRESET depends on machine data"
 _PASSED = """
     G9 G62 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G972 G973 G290 G471 G472
 """
@@ -249,7 +249,7 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
     elif name in COUPLED and not names_axis(control, step):
         return
     elif name in UNFOLLOWED:
-        control.suspend(name, f"{UNFOLLOWED[name]} is in force, which ncfix does not follow")
+        control.suspend(name, f"{UNFOLLOWED[name]} is in force, which ncfix does not support")
     elif name in ("orimks", "oriwks"):
         control.modes.orientation_in_machine = name == "orimks"
         if name == "oriwks" and not control.modes.orientation:
@@ -292,10 +292,10 @@ def transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
     mind_frame(control, step)
     control.resume("traori")
     if len(step.written) > 1:
-        control.suspend("traori", "TRAORI with a direction of the tool of its own is in force")
+        control.suspend("traori", "TRAORI with a tool direction of its own is in force")
     number_of = number(step.arguments[0](control)) if step.written else None
     if number_of is not None and number_of != 1.0:
-        text = f"TRAORI({number_of:g}) is taken as the kinematics of the machine file"
+        text = f"TRAORI({number_of:g}): ncfix uses the kinematics of the machine file"
         control.warn(OTHER_TRANSFORMATION, text, "check that the machine file is that of this transformation")
     control.modes.transformed = True
     control.switch_tcp()
@@ -344,7 +344,7 @@ def modal_call(control: Sinumerik, turn: Turn, step: Calling) -> None:
 def define(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """DEF: define variables."""
     if not step.arguments:
-        raise Fault("NCF110", "DEF has no type and no name", "DEF REAL NAME, at the beginning of a block")
+        raise Fault("NCF110", "DEF needs a type and a name", "write DEF REAL NAME at the beginning of a block")
     kind = str(step.arguments[0](control))
     for place in range(1, len(step.written), 2):
         variable, value = step.written[place], step.written[place + 1]
@@ -402,7 +402,7 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
     words, plan = turn.words, turn.plan
     words.whole = turn.subprogram is not None or bool(turn.elsewhere)
     if "G" in words.values:
-        control.refuse_rest("a G code that is computed (G=..) is not followed")
+        control.refuse_rest("a calculated G code (G=..) is not supported")
     codes(control, turn)
     if turn.frame:
         framing.programmable(control, turn.frame, words)

@@ -80,7 +80,7 @@ RAPID = 0
 
 PLAIN = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)\s*")
 CYCLE = re.compile(r"(?P<name>\w+)\s*\((?P<arguments>.*)\)", re.DOTALL)
-ENDS_HERE = "the hole needs a line behind it, and the subprogram ends in its block"
+ENDS_HERE = "the hole needs a line after it, but the subprogram ends in its block"
 
 END_OF_SUBPROGRAM = frozenset({17.0})
 """M17."""

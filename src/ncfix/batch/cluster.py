@@ -65,7 +65,9 @@ class ClusterExecutor(Executor):
         versions = self.client.run(_version)
         if not versions:
             self.client.close()
-            raise UsageError.of("NCF029", f"{self.address} has no workers", hint="dask worker HOST:PORT --nthreads 1")
+            raise UsageError.of(
+                "NCF029", f"the scheduler at {self.address} has no workers", hint="dask worker HOST:PORT --nthreads 1"
+            )
         others = {found for found in versions.values() if found != __version__}
         if others:
             self.client.close()

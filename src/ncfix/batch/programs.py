@@ -45,8 +45,8 @@ class ProgramFile:
         """Why a program found in a folder is left out (it is a subprogram); None if it is not."""
         if not (self.below and is_subprogram(self.path)):
             return None
-        text = "is a subprogram, and is corrected in the programs that call it, with --flatten"
-        return Message("NCF258", text, Place(self.path), "name the file itself to correct it as a program of its own")
+        text = "is a subprogram; ncfix corrects it in the programs that call it, with --flatten"
+        return Message("NCF258", text, Place(self.path), "name the file itself to correct it as a main program")
 
 
 def program_files(given: Iterable[str], apart: str | None = None) -> list[ProgramFile]:

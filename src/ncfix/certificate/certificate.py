@@ -108,7 +108,7 @@ def said(certificate: Mapping[str, Any]) -> Iterator[str]:
     )
     if certificate["not_proved"]:
         left = sum(each["blocks"] for each in certificate["not_proved"])
-        yield f"  not proved          {left}: the second reader cannot judge them; that is no fault"
+        yield f"  not proved          {left}: the second reader cannot judge them; this is not a fault"
         for each in certificate["not_proved"]:
             lines = " ".join(map(str, each["lines"]))
             more = " ..." if each["blocks"] > len(each["lines"]) else ""
@@ -119,7 +119,7 @@ def said(certificate: Mapping[str, Any]) -> Iterator[str]:
             of = f" (of {each['original_line']} in the original)" if each["original_line"] else ""
             yield f"    line {each['line']}{of}: {each['text']}"
     yield f"  largest correction  {certificate['largest_correction_um']:.1f} um"
-    yield f"  way of the tip      at most {certificate['farthest_um']:.2f} um from the intended one, where proved"
+    yield f"  path of the tip     at most {certificate['farthest_um']:.2f} um from the intended one, where proved"
 
 
 def dumps(certificate: Mapping[str, Any]) -> str:
@@ -133,12 +133,12 @@ def loads(text: bytes, path: str) -> dict[str, Any]:
     try:
         found = json.loads(text.decode("utf-8"))
     except (ValueError, RecursionError) as error:
-        raise SourceError.of("NCF034", f"is no certificate: {error}", Place(path), hint) from None
+        raise SourceError.of("NCF034", f"is not a certificate: {error}", Place(path), hint) from None
     if not isinstance(found, dict) or found.get("schema") != SCHEMA or not all(key in found for key in (*HELD, *FOUND)):
-        raise SourceError.of("NCF034", "is no certificate of this version of ncfix", Place(path), hint)
+        raise SourceError.of("NCF034", "is not a certificate of this version of ncfix", Place(path), hint)
     for name in HELD[:3]:
         if not isinstance(found[name], dict) or not isinstance(found[name].get("sha256"), str):
-            raise SourceError.of("NCF034", f"is no certificate: {name} has no hash", Place(path), hint)
+            raise SourceError.of("NCF034", f"is not a certificate: {name} has no hash", Place(path), hint)
     return found
 
 
@@ -147,9 +147,9 @@ def differences(certificate: Mapping[str, Any], now: Mapping[str, Any]) -> Itera
     titles = {"original": "the original", "corrected": "the corrected program", "machine": "the machine file"}
     for name, title in titles.items():
         if certificate[name]["sha256"] != now[name]["sha256"]:
-            yield f"{title} is not the one of the certificate"
+            yield f"{title} is not that of the certificate"
     if certificate["setup_sha256"] != now["setup_sha256"]:
-        yield "the setup is not the one of the certificate"
+        yield "the setup is not that of the certificate"
     if certificate["dialect"] != now["dialect"]:
         yield f"the dialect of the certificate is {certificate['dialect']}, not {now['dialect']}"
     for name in FOUND:

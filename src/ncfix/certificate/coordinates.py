@@ -96,7 +96,9 @@ class FollowedAxes:
     def lose_by(self, name: str) -> None:
         """Follow no further because of a word or code."""
         modal = CYCLES.match(name) is not None
-        self.lose(f"{name} is not known to this reader", rewritten=modal or bool(REWRITTEN.match(name)), modal=modal)
+        self.lose(
+            f"{name} is not known to the second reader", rewritten=modal or bool(REWRITTEN.match(name)), modal=modal
+        )
 
     @property
     def is_rewritten(self) -> bool:
@@ -147,7 +149,7 @@ class FollowedAxes:
         if on == self.tcp or (self.given.tcp and self.family is not Family.KLARTEXT):
             return
         if self.turn is not None:
-            self.lose("tool-centre-point control in turned coordinates")
+            self.lose("tool-centre-point control in rotated coordinates")
         if self.family is not Family.KLARTEXT and (any(self.shifts.values()) or any(self.local.values())):
             self.lose("a shift under tool-centre-point control")
         self.tcp = on
@@ -163,7 +165,7 @@ class FollowedAxes:
         """
         self.end_turn()
         if self.model is None or (tilted and not self.model.leads):
-            self.lose("turned coordinates on a machine whose axes do not lead the tip everywhere")
+            self.lose("rotated coordinates on a machine whose linear axes cannot move the tip in all directions")
             return
         if tilted:
             asked = self.asks_tip
@@ -177,7 +179,7 @@ class FollowedAxes:
         self.end_turn()
         middle = np.array([centre.get(axis, 0.0) for axis in "XYZ"])
         if self.model is None or self.tcp:
-            self.lose("turned coordinates under tool-centre-point control")
+            self.lose("rotated coordinates under tool-centre-point control")
         else:
             self._enter(TurnedFrame(self.model.columns, rotation, middle, middle, False))
 

@@ -24,7 +24,7 @@ ASIDE = math.radians(0.09)
 """
 HALF_TURN = 179.5
 """Turn, degrees, that a correction may change into half a turn or more."""
-NO_ANSWER = "the machine model has no answer"
+NO_ANSWER = "the machine model gives no result"
 WIDER = 1.05
 """Factor of the tolerance above which a way is surely beyond it."""
 
@@ -130,11 +130,11 @@ class Deviations(Expected):
             if piece.why:
                 return piece.why
             if any(map(math.isnan, piece.end)):
-                return "where an axis stands is not known"
+                return "the position of an axis is not known"
         if not self.sure[self.ours.at[step.row]]:
             return NO_ANSWER
         if self.machine.depends_on_direction and not self.sure_of_side(step):
-            return "play: the side of an axis is not known to this reader"
+            return "backlash: the side of an axis is not known to the second reader"
         return ""
 
     def aside(self, at: Indices) -> Array:

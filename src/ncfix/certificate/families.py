@@ -97,7 +97,7 @@ class WordAddressFollower(AxisFollower):
             return self.called_hole(row, line, dict(self.at), call)
         else:
             self.foreign.add(row)
-            self.lose("a drilling cycle that this reader does not know", rewritten=True, modal=True)
+            self.lose("a drilling cycle not known to the second reader", rewritten=True, modal=True)
         return None
 
     def _hole_after(self, row: int, line: TextLine, words: Mapping[str, TextWord], call: HoleCall) -> AxisStep:
@@ -113,7 +113,7 @@ class WordAddressFollower(AxisFollower):
         name = variable_name(word.name)
         self.variables[name] = value_of(word.number, self.variables)
         if name[1:].isdecimal() and int(name[1:]) >= OF_THE_CONTROL:
-            self.lose("a variable of the control gets a value")
+            self.lose("the program sets a variable of the control")
 
     def _smooths(self, line: TextLine, codes: Sequence[int]) -> bool:
         """Whether a line only sets the smoothing of the path, and its axes (G5.1 Q2 X0 Y0)."""
@@ -298,7 +298,7 @@ class WordAddressFollower(AxisFollower):
                     pass
                 case _:
                     self.lose_by(f"G{code / 10:g}")
-                    apart = apart or f"G{code / 10:g} is not known to this reader"
+                    apart = apart or f"G{code / 10:g} is not known to the second reader"
         if self.tcp and not length_set and any(code in (540, 550, 560, 570) for code in codes):
             self.unsay("XYZ")
         return apart, fixed or any(word.name == "SUPA" for word in line.codes)
@@ -397,7 +397,7 @@ class WordAddressFollower(AxisFollower):
                     if self.turn is None or self.turn.tilted:
                         self.end_turn()
                     else:
-                        self.lose("CYCLE800 in turned coordinates")
+                        self.lose("CYCLE800 in rotated coordinates")
                 case "MCALL":
                     self._modal_call(alone=[other.name for other in line.codes if other.name != "N"] == ["MCALL"])
                 case name if len(name) > 1:
@@ -428,7 +428,7 @@ class WordAddressFollower(AxisFollower):
         if name != self.system:
             self.system = name
             if self.turn is not None:
-                self.lose("another work offset in turned coordinates")
+                self.lose("another work offset in rotated coordinates")
         self.unsay()
 
     def _length_offset(self, line: TextLine, tcp: bool) -> None:
@@ -468,7 +468,7 @@ class WordAddressFollower(AxisFollower):
     def _hole(self, row: int, line: TextLine, words: Mapping[str, TextWord]) -> AxisStep:
         """The step of a hole by a drilling cycle of word addresses: in G17, with absolute words."""
         if self.counting or self.plane != 17 or line.code("K") or line.code("L") or line.word("I") or line.word("K"):
-            step = self.step(row, Kind.HOLE, dict(self.at), line, "a drilling cycle that this reader does not know")
+            step = self.step(row, Kind.HOLE, dict(self.at), line, "a drilling cycle not known to the second reader")
             step.foreign = True  # a correction may write a repeated one out
             return step
         for name in "ZR":

@@ -48,7 +48,7 @@ MOST_SWITCHES = 4
 """Largest number of switches of block delete whose positions are all examined, as by `fix`."""
 LEAST = 6
 """Least number of consecutive straight lines that are followed in columns."""
-UNKNOWN_WORDS = "words that this reader does not know here"
+UNKNOWN_WORDS = "words that the second reader does not know here"
 ROUND = 179.0
 """Turn, degrees, above which the shorter way may be the other one: half a turn minus a correction."""
 NO_POLE, NO_CENTRE = "the pole is not known", "an arc without a centre"
@@ -134,7 +134,7 @@ class AxisFollower(FollowedAxes):
             if call is not None and self.calls.get(row) != call:
                 self.foreign.add(row)
             row = order.line_after(row, self.variables)
-        self.lose("behind the end of the program", rewritten=True)
+        self.lose("after the end of the program", rewritten=True)
         for row in range(len(lines)):
             if row not in made and row not in order.lines:
                 made[row] = [self._line(row, lines[row])]
@@ -144,7 +144,7 @@ class AxisFollower(FollowedAxes):
             if step is not None:
                 last, *further = steps[MOST_TURNS - 1 :] or [step]
                 if last is None or not all(other is not None and last.is_like(other) for other in further):
-                    step.why = step.why or "a motion that is made in more ways than this reader looks at"
+                    step.why = step.why or "a motion with more possible paths than the second reader checks"
                 log.add(step)
         self.turns = {row: len(steps) for row, steps in made.items()}
         return log.done()
@@ -160,12 +160,12 @@ class AxisFollower(FollowedAxes):
             return None
         found = self.block(row, line)
         if self.ended:
-            self.lose("behind the end of the program", rewritten=True)
+            self.lose("after the end of the program", rewritten=True)
         if found is not None:
             if self.turn is not None and not found.why and found.kind is not Kind.FIXED:
                 found = self.turn.step(found)
                 if self.turn.tilted and self.length != found.length:
-                    found.why = "the length of the tool is not in force in a tilted plane"
+                    found.why = "the tool length is not in force in a tilted plane"
             if found.why:
                 self.forget()
         return found
@@ -245,7 +245,7 @@ class AxisFollower(FollowedAxes):
         if not why:
             why = next((loss.why for loss in self.lost), "")
         if not why and self.shortest and self._goes_round(np.array([[*self.at.values()], [*end.values()]])):
-            why = "a rotary axis goes the shorter way (M126)"
+            why = "a rotary axis takes the shorter path (M126)"
         step = AxisStep(
             row,
             kind,
@@ -301,7 +301,7 @@ class AxisFollower(FollowedAxes):
         """The step of a hole whose cycle is called over a place, in G17."""
         offset, unit = self.offset("Z"), self.scale("Z")
         self.said["Z"] = True
-        why = "" if self.plane == 17 and not self.counting else "a drilling cycle that this reader does not know"
+        why = "" if self.plane == 17 and not self.counting else "a drilling cycle not known to the second reader"
         step = self.step(row, Kind.HOLE, {**over, "Z": offset + unit * call.bottom}, line, why)
         step.foreign |= bool(why)
         self.at = {**over, "Z": offset + unit * call.level}

@@ -133,7 +133,7 @@ class KlartextFollower(AxisFollower):
         """Apply PLANE SPATIAL or RESET: begin a tilted plane, or end it; with TURN and MOVE the rotary axes turn."""
         plane = PlaneBlock.of(lead)
         if plane is None or (self.turn is not None and not self.turn.tilted):
-            self.lose("a plane that this reader does not know")
+            self.lose("a plane that the second reader does not know")
             return
         turning = [axis for axis in self.axes if axis in "ABC"]
         rotation = np.eye(3) if plane.rotation is None else plane.rotation
@@ -159,13 +159,13 @@ class KlartextFollower(AxisFollower):
         """Apply a line of cycle 7, a datum shift, or of cycle 10, a rotation about the datum."""
         numbers = TRANSFORM_WORD.findall(text)
         if self.lost or self.tcp or "".join(map("".join, numbers)) != re.sub(r"[ \t]", "", text.partition(";")[0]):
-            self.lose(f"cycle {cycle} in a form that this reader does not know")
+            self.lose(f"cycle {cycle} in a form that the second reader does not know")
         elif cycle == "10" and "I" not in text:
             self.end_turn()
             if numbers and float(numbers[-1][1].replace(",", ".")):
                 self.begin_turn(about("Z", float(numbers[-1][1].replace(",", "."))), tilted=False)
         elif self.turn is not None or any("ROT" in name for name, _ in numbers):
-            self.lose(f"cycle {cycle} in turned coordinates")
+            self.lose(f"cycle {cycle} in rotated coordinates")
         else:
             for name, number in numbers:
                 counted, axis = name.startswith("I"), name[-1]
@@ -176,12 +176,12 @@ class KlartextFollower(AxisFollower):
     def _call_tool(self, lead: str) -> None:
         found, more = TOOL.match(lead), OVERSIZE.search(lead)
         if (more and more[1] is None) or not (found or more or (SPEED.match(lead) and not self.oversize)):
-            self.lose("a tool call without a tool or an oversize that this reader knows")
+            self.lose("a tool call without a tool or an oversize that the second reader knows")
         elif found or more:
             if found:
                 self.tool = int(found[1]) if found[1] else found[2]
             if self.tcp:
-                self.lose("another tool while the tip is led (M128, TCPM)")
+                self.lose("another tool under tool-centre-point control (M128, TCPM)")
             self.oversize = float(more[1].replace(",", ".")) * self.unit if more else 0.0
             self.new_length(self.length_of(self.tool))
             self.unsay()
@@ -203,11 +203,11 @@ class KlartextFollower(AxisFollower):
         """The step of a path function."""
         turn, keys = line.word("PA"), {word.name for word in line.codes}
         if lead == "LN":
-            step = self.step(row, Kind.FEED, dict(self.at), line, "a surface normal or a direction of the tool (LN)")
+            step = self.step(row, Kind.FEED, dict(self.at), line, "a surface normal or a tool direction (LN)")
             step.foreign = True
             return step
         if lead not in ("L", "C", "CR", "CP") or (lead == "CP") != (turn is not None):
-            return self.step(row, Kind.FEED, dict(self.at), line, f"{lead} is not known to this reader")
+            return self.step(row, Kind.FEED, dict(self.at), line, f"{lead} is not known to the second reader")
         self.kind = Kind.RAPID if "FMAX" in keys else Kind.FEED
         end = self.target({k: v for k, v in words.items() if k in self.at})
         if turn is not None:
@@ -218,7 +218,7 @@ class KlartextFollower(AxisFollower):
         if lead == "L" or step.why:
             return step
         if keys.isdisjoint(("DR+", "DR-")):
-            step.why = "an arc without its sense"
+            step.why = "an arc without its direction (DR)"
             return step
         if lead != "CR":
             return self._arc_about_pole(step, turn, "DR-" in keys)
@@ -233,7 +233,7 @@ class KlartextFollower(AxisFollower):
         call = HoleCall.of_parameters(self.drilling, self.variables)
         step = self.called_hole(row, line, over, call)
         if not self.drilling or math.isnan(call.bottom):
-            step.why, step.foreign = step.why or "a drilling cycle that this reader does not know", True
+            step.why, step.foreign = step.why or "a drilling cycle not known to the second reader", True
         return step
 
     def _arc_about_pole(self, step: AxisStep, turn: TextWord | None, clockwise: bool) -> AxisStep:

@@ -22,11 +22,11 @@ TURNED = 1e-9
 """Difference, rad, up to which rotary positions agree; `SLACK` for linear ones."""
 AS_IF = 4e-4
 """Allowance, mm, if the place of an axis is not known: the others are corrected as if it stood in its place."""
-OFF = "{} ends {} from where the correction belongs"
-UNSAID = "the program has not said where an axis stands"
-BY_VECTOR = "the way of a motion in which the tool turns in a plane (PATHCTRL VECTOR)"
-LEFT = "left as it was programmed"
-UNSURE = "which added lines belong to which block is not known"
+OFF = "{} ends {} from the corrected position"
+UNSAID = "the program has not yet given the position of an axis"
+BY_VECTOR = "the path of a motion in which the tool turns in a plane (PATHCTRL VECTOR)"
+LEFT = "left unchanged"
+UNSURE = "the block of some added lines is not known"
 
 
 class MotionJudge(Deviations):
@@ -99,7 +99,7 @@ class MotionJudge(Deviations):
         elif why := self.unfollowed(step, pieces):
             self.proof.leave(why, number)
         else:
-            self.proof.fault("the block does not move as it did", line, number)
+            self.proof.fault("the block does not make the same motion as before", line, number)
 
     def _right_ends(self, moved: Moved) -> Mask:
         """(m,) whether the ends of motions are surely right; the others are judged by `_end`."""
@@ -194,11 +194,11 @@ class MotionJudge(Deviations):
             return ""
         feeds = [piece.feed or 0.0 for piece in pieces]
         if any(piece.feed_mode != step.feed_mode for piece in pieces):
-            return "" if turn else "the feed is meant in another way"
+            return "" if turn else "the unit of the feed rate has changed"
         if step.feed_mode == 93:
             ours = 1 / step.feed if step.feed else math.inf
             theirs = sum(1 / feed if feed else math.inf for feed in feeds)
-            return "" if abs(theirs - ours) <= 2e-3 * ours else "the pieces take another time than the block"
+            return "" if abs(theirs - ours) <= 2e-3 * ours else "the pieces have another duration than the block"
         return "" if all(feed == step.feed for feed in feeds) else "the feed has changed"
 
     def _ways(self, moved: Moved) -> None:
@@ -223,7 +223,7 @@ class MotionJudge(Deviations):
         before[np.concatenate([[0], last[:-1] + 1])] = 0.0
         bad: dict[int, str] = {}
         for k in inner[share[inner] < before[inner] - 1e-2].tolist():
-            bad.setdefault(int(owner[k]), "the pieces of the block are not one behind the other")
+            bad.setdefault(int(owner[k]), "the pieces of the block are not in sequence")
         given = (tcp, length, direction)
         allowed = self.allowed(cutting.ours)[owner]
         opens = np.concatenate([[0], last[:-1] + 1])
@@ -238,7 +238,7 @@ class MotionJudge(Deviations):
             places = self.gaps(meant.at(owner[inner], share[inner]), done.end[inner], owner[inner], given)
             gap[inner] = np.maximum(gap[inner], places)
         for k in np.flatnonzero(~(gap <= allowed)).tolist():
-            text = f"the tip leaves the intended way by {1e3 * gap[k]:.2f} um between the ends of the block"
+            text = f"the tip leaves the intended path by {1e3 * gap[k]:.2f} um between the ends of the block"
             bad.setdefault(int(owner[k]), text if math.isfinite(gap[k] - allowed[k]) else NO_ANSWER)
         aside = self.aside(cutting.ours)
         for k in np.flatnonzero(aside > ASIDE).tolist():
@@ -271,10 +271,10 @@ class MotionJudge(Deviations):
             if aside:
                 return BY_VECTOR
             if pair.row in self.begin_apart:
-                return "the way of a motion that may begin at several places"
+                return "the path of a motion that may begin at several positions"
             if (turn >= HALF_TURN)[self.machine.rotary & (high - low >= 2 * math.pi)].any():
-                return "a rotary axis may go the other way round"
+                return "a rotary axis may turn in the other direction"
         if self.strategy == "full" or self.machine.depends_on_direction:
-            why = "play" if self.machine.depends_on_direction else "rotary axes that are corrected, too"
-            return f"the way of a motion, because of {why}"
+            why = "backlash" if self.machine.depends_on_direction else "rotary axes are corrected, too"
+            return f"the path of a motion: {why}"
         return ""

@@ -293,7 +293,7 @@ class Pairing:
     def _lost(self, row: int) -> None:
         if self.original.lines[row].rest.strip() or self.original.lines[row].path:
             line = self.original.lines[row].number
-            self.faults.append(BlockFault("a line is not there any more", self._line(), line))
+            self.faults.append(BlockFault("a line is missing", self._line(), line))
 
     def _line(self) -> int:
         return self.corrected.lines[self.pairs[-1].last].number if self.pairs else 1
@@ -301,7 +301,7 @@ class Pairing:
     def _extra(self, first: int, stop: int) -> None:
         for line in self.corrected.lines[first:stop]:
             if line.rest.strip() or line.path:
-                self.faults.append(BlockFault("a line that the original does not have", line.number, 0))
+                self.faults.append(BlockFault("the original does not have this line", line.number, 0))
 
 
 def _number(key: str | None) -> int:
@@ -340,18 +340,18 @@ def hole_faults(pairing: Pairing, pair: LinePair, call: HoleCall) -> list[str]:
     if any(piece.skipped != line.skipped for piece in pieces):
         found.append("a line of the block has another mark of block delete")
     if len(led) > 1 or any(piece.doubled() for piece in led):
-        found.append("two lines or two words lead to a hole")
+        found.append("two lines or two words give the position of a hole")
     if names != [word.name for piece in led for word in piece.path][: len(names)]:
-        found.append("the words of axes that lead to a hole have changed")
+        found.append("the axis words of a hole have changed")
     if family is Family.KLARTEXT and any(piece.block != line.block for piece in pieces):
         found.append("the block has another number")
     ours, theirs = (hole_text(family, lines) for lines in ([line], pieces))
     if not line.path:  # then the tool is led there by a line that was added
         theirs = [word for word in theirs if word.upper() not in ("L", "G0", "FMAX", "/")]
     if ours != theirs:
-        found.append("words that are no axes have changed")
+        found.append("words other than axis words have changed")
     if not puts_back(call, pieces):
-        found.append("what was changed for the hole is not put back behind it")
+        found.append("the change for the hole is not cancelled after it")
     return found
 
 
@@ -385,12 +385,12 @@ def text_faults(pairing: Pairing, pair: LinePair, arc: bool, timed: bool) -> lis
     for words in free:
         ours, theirs = words.sub("", ours), words.sub("", theirs)
     if ours.rstrip() != theirs.rstrip() and not _paced(ours, theirs, line, timed):
-        found.append("words that are no axes have changed")
+        found.append("words other than axis words have changed")
     names = [word.name for word in line.path if not arc or word.name in "XYZABCUVW"]
     left = [word.name for word in head.path]
-    lost = [f"the word {name} is not there any more" for name in names if name not in left]
+    lost = [f"the word {name} is missing" for name in names if name not in left]
     if not (found or lost) and [name for name in left if name in names] != names:
-        lost = ["words have changed their places"]
+        lost = ["words have changed their order"]
     number = ["the block has another number"] if klartext and head.block != line.block else []
     return [*found, *lost, *number]
 
@@ -407,7 +407,7 @@ def _late_faults(line: TextLine, pieces: Sequence[TextLine], late: re.Pattern[st
     if _words(STOPS, line.rest) != _words(STOPS, pieces[-1].rest):
         return ["a stop is not at the end of the pieces of its block"]
     if sorted(_words(late, line.rest)) != sorted(word for piece in pieces for word in _words(late, piece.rest)):
-        return ["a word that acts at the end of the block is lost, or there twice"]
+        return ["a word that acts at the end of the block is missing or appears twice"]
     return []
 
 

@@ -165,9 +165,9 @@ class Prover(MotionJudge):
     def _stamps(self) -> None:
         stamp = self.second.stamp
         if stamp is not None and stamp.machine != self.machine_hash:
-            self.proof.fault("the stamp names another machine, or this one before it was changed", stamp.line, 0)
+            self.proof.fault("the stamp is of another machine, or of this machine file before a change", stamp.line, 0)
         if stamp is None and not self.first.says(self.second):
-            self.proof.fault("the program has changed and carries no stamp", 1, 0)
+            self.proof.fault("the program has changed but has no stamp", 1, 0)
 
     def _text(self, pairing: Pairing, pair: LinePair) -> None:
         step = self.ours.get(pair.row)
@@ -182,7 +182,7 @@ class Prover(MotionJudge):
         else:
             faults = text_faults(pairing, pair, arc, timed=step is not None and step.feed_mode == 93)
         if call is not None and self.calls_otherwise(pair, call):
-            faults.append("the call of the cycle has changed by more than the depth of its hole")
+            faults.append("the call of the cycle has changed in more than the depth of its hole")
         for text in faults:
             self.proof.fault(text, line, number)
 
@@ -214,11 +214,11 @@ class Prover(MotionJudge):
                 self.proof.proved_motions += 1
             return ""
         if self.model is None or (step.tcp and not self.model.leads):
-            return "the machine has no three linear axes that lead the tip everywhere"
+            return "the machine does not have three linear axes that move the tip in all directions"
         if self.strategy not in PLAIN_STRATEGIES and self.strategy != "full":
-            return f"the strategy {self.strategy} does not bring the tip to its place"
+            return f"the strategy {self.strategy} does not correct the tip position"
         if any(map(math.isnan, step.end)):
-            return "where an axis stands is not known"
+            return "the position of an axis is not known"
         if math.isnan(step.length):
             if step.tcp or self.machine.depends_on_tool_length:
                 return "the length of the tool is not known"
@@ -241,12 +241,12 @@ class Prover(MotionJudge):
             off = np.where(self.machine.rotary, 0.0, np.abs(np.subtract(other.end, step.end)))
             if (off > most).any():
                 axis = self.machine.axis_names[int(np.nanargmax(off))]
-                self.proof.fault(f"{axis} has changed by more than corrections are", last.number, line.number)
+                self.proof.fault(f"{axis} has changed by more than a correction", last.number, line.number)
                 return
         for word in line.path if step.kind != Kind.ARC else ():
             found = last.word(word.name)
             if word.name not in "XYZ" or found is None or word.value is None or found.value is None:
                 continue
             if abs(found.value - word.value) * step.unit > most:
-                self.proof.fault(f"{word.name} has changed by more than corrections are", last.number, line.number)
+                self.proof.fault(f"{word.name} has changed by more than a correction", last.number, line.number)
                 return

@@ -158,7 +158,7 @@ def _word_address(number: int, text: str) -> TextLine:
         letter = found[2]
         if letter is None:
             if found[5] is not None and found[5] not in "/*:" and start >= marked:
-                line.odd = line.odd or f"{_piece(text, start)!r} is no plain word"
+                line.odd = line.odd or f"{_piece(text, start)!r} is not a plain word"
         else:
             name, digits = letter.upper(), found[3]
             word = TextWord(name, digits or found[4], float(digits) if digits else None)
@@ -176,7 +176,7 @@ def _word_address(number: int, text: str) -> TextLine:
 CYCLE_CALL = rf"CYCLE(?:8[1-9]|840)[ \t]*\([ \t]*(?:{NUMBER})?[ \t]*(?:,[ \t]*(?:{NUMBER})?[ \t]*)*\)"
 """A drilling cycle of SINUMERIK with plain numbers."""
 JUMPS = "the program has loops, jumps or subprograms"
-RETRACTS = "M140 retracts the tool by a way that the control finds"
+RETRACTS = "M140 retracts the tool by a distance that the control calculates"
 CODE = r"[A-Z]{1,2}\d*"
 SINUMERIK_WORD = re.compile(
     rf"(;.*|\"[^\"]*\")"
@@ -224,11 +224,11 @@ def _sinumerik(number: int, text: str) -> TextLine:
             if SINUMERIK_FLOW.match(key):
                 line.odd = JUMPS
             elif re.match(r"[A-Z]\d", key):
-                line.odd = line.odd or f"{key!r} is no plain word"
+                line.odd = line.odd or f"{key!r} is not a plain word"
             elif "(" in key and not key.startswith("CYCLE800(") and not re.fullmatch(CYCLE_CALL, key):
-                line.odd = line.odd or f"{key.partition('(')[0].strip()} is not known to this reader"
+                line.odd = line.odd or f"{key.partition('(')[0].strip()} is not known to the second reader"
         elif found[10] is not None and found[10] not in "/%:" and start >= marked:
-            line.odd = line.odd or f"{_piece(text, start)!r} is no plain word"
+            line.odd = line.odd or f"{_piece(text, start)!r} is not a plain word"
     line.rest = str(rest)
     return line
 
@@ -267,7 +267,7 @@ def _klartext(number: int, text: str) -> TextLine:
     if body_upper and first not in KLARTEXT_LEAD and not re.match(r"(;|M\d)", body_upper):
         line.rest = body
         line.codes.append(TextWord(body_upper, "", None))
-        line.odd = JUMPS if KLARTEXT_FLOW.match(body_upper) else f"{first} is not known to this reader"
+        line.odd = JUMPS if KLARTEXT_FLOW.match(body_upper) else f"{first} is not known to the second reader"
         if KLARTEXT_STATEMENT.match(body_upper):
             line.odd = ""
         return line
@@ -287,9 +287,9 @@ def _klartext(number: int, text: str) -> TextLine:
         elif found[2] is not None or found[5] is not None:
             line.codes.append(TextWord((found[2] or found[5]).upper(), "", None))
             if found[5] is not None and found[5].upper() not in KLARTEXT_LEAD:
-                line.odd = line.odd or f"{found[5]} is not known to this reader"
+                line.odd = line.odd or f"{found[5]} is not known to the second reader"
         elif found[6] is not None and found[6] not in "*/":
-            line.odd = line.odd or f"{_piece(body, start)!r} is no plain word"
+            line.odd = line.odd or f"{_piece(body, start)!r} is not a plain word"
     if any(word.name == "M" and word.value == 140 for word in line.codes):
         line.odd = RETRACTS
     line.rest = str(rest)

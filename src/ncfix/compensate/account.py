@@ -24,9 +24,9 @@ from ncfix.text.tree import Program
 from ncfix.values import frozen
 
 REFUSED = "refused"
-LEFT = "an axis is left where it stands"
-UNKNOWN = "where it begins or ends is not known"
-MEASURED = "it leads to where the machine has measured itself"
+LEFT = "an axis gets no word"
+UNKNOWN = "its start or end is not known"
+MEASURED = "its end is a position that the machine has measured"
 BY_RULE = "passed by rule"
 """Reason of motions that pass by a rule without a name."""
 
@@ -92,7 +92,9 @@ def not_looked_at(moves: Moves) -> dict[NoFigureReason, Index]:
 
 MAX_STRETCHES = 4
 """Largest number of stretches of lines that a message names one by one."""
-HINT = "name it in one of the first blocks, and again after a change of tool or offsets, or after machine coordinates"
+HINT = (
+    "program it in one of the first blocks, and again after a change of tool or offsets, or after machine coordinates"
+)
 
 
 @frozen
@@ -137,12 +139,12 @@ class LeftAxis:
             many = f"{self.motions} motions ({lines_named(self.stretches, MAX_STRETCHES)}), {cutting} of which cut"
         most = max(each.most for each in (self, *others))
         far = f"{np.degrees(most):.4g} degrees" if self.rotary else f"{most * 1e3:.2f} um"
-        they, are, stand = ("they", "are", "stand") if others else ("it", "is", "stands")
+        get, are = ("get", "are") if others else ("gets", "is")
         axes = ", ".join(each.axis for each in (self, *others[:-1]))
         axes += f" and {others[-1].axis}" if others else ""
         text = (
-            f"{axes} {are} left where {they} {stand} in {many}, up to {far} beside where {they} should be: "
-            f"the program has not said where {they} {are}, or the control offsets or rounds the contour there"
+            f"{axes} {get} no word in {many}, and {are} up to {far} from the corrected position: the program has not "
+            "yet given the position, or the control offsets or rounds the contour there"
         )
         return Message("NCF439", text, Place(path, self.first), HINT if self.cuts else "")
 

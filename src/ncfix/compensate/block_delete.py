@@ -54,7 +54,7 @@ MAX_SINGLE_ATTEMPTS = 4
 would find only the next of a chain of blocks that begin where another ends, and a program may be one chain."""
 POSITION_DECIMALS = 9
 """Decimals, of mm and rad, to which two positions must agree to count as the same."""
-WHY = "where a block with / before it is skipped, this block needs another correction than where that is executed"
+WHY = "if a block with / before it is skipped, this block needs another correction than if it is executed"
 
 Follow = Callable[[Setup], Trace]
 Edits = tuple[Edit, ...]
@@ -103,8 +103,11 @@ def positions_of(setup: Setup, follow: Follow) -> tuple[SwitchSetting, ...]:
     while len(outcomes) < 2 ** len(switches):
         if len(switches) > MOST_SWITCHES:
             text = f"the program has {len(switches)} switches of block delete ({named_switches(switches)})"
-            hint = f"--block-skip on, off, or the numbers of those that are on: up to {MOST_SWITCHES} are all looked at"
-            raise RefusedError.of(TOO_MANY, f"{text}: too many to prove each position of them", None, hint)
+            hint = (
+                "give --block-skip on, off, or the numbers of those that are on: ncfix checks all positions of up to "
+                f"{MOST_SWITCHES} switches"
+            )
+            raise RefusedError.of(TOO_MANY, f"{text}: too many to prove all their positions", None, hint)
         for on in (
             frozenset(each) for count in range(len(switches) + 1) for each in combinations(sorted(switches), count)
         ):
@@ -135,8 +138,8 @@ def _outcome(setup: Setup, follow: Follow) -> Trace | UsageError:
         if not setup.block_skip:
             raise
         assert isinstance(setup.block_skip, frozenset)
-        words = f"where blocks with {named_switches(setup.block_skip)} are skipped"
-        hint = "--block-skip off: they never are, and only this is looked at"
+        words = f"if blocks with {named_switches(setup.block_skip)} are skipped"
+        hint = "--block-skip off if they are never skipped: ncfix then uses only that position"
         raise SourceError.collected(
             replace(each, text=f"{words}: {each.text}", hint=hint) for each in error.messages
         ) from None
@@ -178,8 +181,10 @@ def messages_of(positions: Sequence[SwitchSetting]) -> tuple[Message, ...]:
     first = min(filter(None, places), key=lambda place: place.line, default=None)
     (switches, *_), many = (each.trace.switches for each in positions), len(positions)
     words = "/" if len(switches) == 1 else named_switches(switches), "both" if many == 2 else f"all {many}"
-    text = "blocks with {} may be executed or skipped: {} positions of block delete are held to".format(*words)
-    return (Message(BLOCK_DELETE, text, first, "--block-skip on or off looks at one position only"), *rest)
+    text = (
+        "blocks with {} may be executed or skipped: ncfix keeps the tolerance in {} positions of block delete"
+    ).format(*words)
+    return (Message(BLOCK_DELETE, text, first, "--block-skip on or off: ncfix uses that position only"), *rest)
 
 
 def worst_findings(every: Sequence[WrittenPlan]) -> list[tuple[Finding, ...]]:
@@ -421,8 +426,8 @@ class WholeProof:
         except SelfCheckError as why:
             if len(self.follows) == 1:
                 raise
-            wrong = f"no text was found that is right in all positions of block delete: {why}"
-            hint = "--block-skip on or off corrects it for one position, if the switch always stands so"
+            wrong = f"no corrected text is right in all positions of block delete: {why}"
+            hint = "--block-skip on or off corrects it for one position, if the switch is always in that position"
             raise RefusedError.of(NOT_IN_ALL, wrong, Place(self.program.path), hint) from why
 
     def _misreadings(self, joint: JointPlan, text: bytes) -> Readings | None:
@@ -437,7 +442,7 @@ class WholeProof:
             pieces, move = solution.plan.pieces, int(solution.plan.pieces.move[piece])
             meant = solution.moves.end[move] if pieces.unchanged[piece] else solution.emission.end[piece]
             line = self.program.line(int(solution.moves.block[move]))
-            raise SelfCheckError(f"line {line} would lead to {again.end[piece]}, not to {meant}")
+            raise SelfCheckError(f"line {line} would end at {again.end[piece]}, not at {meant}")
         return [SecondReading.of(again, solution.plan.pieces) for solution, again in pairs]
 
     def _again(self, text: bytes, follow: Callable[[Program], Trace]) -> Moves:
@@ -448,4 +453,4 @@ class WholeProof:
 
     def astray(self, line: int | None, errors: PathError) -> Exception:
         """See `driver.Proof.astray`."""
-        return SelfCheckError(f"line {line} would lead {errors.after.max:.3f} mm away from where it should")
+        return SelfCheckError(f"line {line} would end {errors.after.max:.3f} mm from the intended position")

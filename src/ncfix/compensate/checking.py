@@ -124,7 +124,7 @@ class Survey:
         found = None if self.stamp else stamp.find(program)
         if found is not None:
             text = "the program has been corrected already"
-            self.stamp = (Message("NCF430", text, program.place(found), "fix the original"),)
+            self.stamp = (Message("NCF430", text, program.place(found), "correct the original program"),)
         blocks, rows = np.unique(np.where(moves.rule == Rule.REFUSE, moves.block, -1), return_index=True)
         for block, row in zip(blocks.tolist(), rows.tolist(), strict=True):
             if block >= 0:

@@ -316,8 +316,8 @@ def fix_flat(
     if all(each.code == NEVER for each in fixed.report.refused):
         return fixed
     if len(fixed.report.block_delete) > 1:
-        text = "not written out flat: its numbers would be those of one position of block delete"
-        note = Message("NCF447", text, Place(program.path), "--block-skip on or off says which one")
+        text = "not written out flat: a flat program would have the numbers of one position of block delete"
+        note = Message("NCF447", text, Place(program.path), "give that position with --block-skip on or off")
         return replace(fixed, report=replace(fixed.report, warnings=(note, *fixed.report.warnings)))
     steps = increments(resolving(machine, program.dialect, program.source))
     by_name = dict(zip(machine.axis_names, np.where(machine.rotary, np.degrees(steps), steps).tolist(), strict=True))

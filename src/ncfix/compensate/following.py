@@ -37,7 +37,7 @@ from ncfix.values import frozen
 from ncfix.version import __version__
 
 Resolve = Callable[[str], bytes | None]
-FORCE = "fix the original program, or say --force if this is it"
+FORCE = "correct the original program, or use --force if this is the original"
 
 
 @frozen
@@ -145,8 +145,8 @@ def with_tool_lengths(program: Program, followed: Trace, machine: Machine, setup
     if machine.depends_on_tool_length:
         below = _first_motions(moves, (moves.tool_length < 0) & (moves.rule == Rule.CORRECT))
         if below:
-            text = "the length offset of tool {tool} is {length:g} mm: that does not say how long the tool is"
-            hint = "give its length from the gauge line to the tip, and the work offset lower by the difference"
+            text = "the length offset of tool {tool} is {length:g} mm: that is not the length of the tool"
+            hint = "give its length from the gauge line to the tip, and lower the work offset by the difference"
             raise UsageError.collected(told("NCF446", below, text, hint))
     unknown = np.isnan(moves.tool_length)
     if not unknown.any():
@@ -157,12 +157,12 @@ def with_tool_lengths(program: Program, followed: Trace, machine: Machine, setup
         return known
     first = _first_motions(moves, unknown)
     if not setup.assume_zero:
-        text = "the length of tool {tool} is needed and not given: the errors of this machine depend on it"
+        text = "the length of tool {tool} is not given, but the errors of this machine depend on it"
         hint = (
             "--tool {tool}=LENGTH, or `{tool} = {{ length = ... }}` under [tools] in the setup file, or --assume-zero"
         )
         raise UsageError.collected(told("NCF431", first, text, hint))
-    text = "the length of tool {tool} is not given and was taken as zero"
+    text = "the length of tool {tool} is not given; ncfix uses zero"
     notes = told("NCF437", first, text, "--tool {tool}=LENGTH")
     assumed = (*followed.assumed, *(f"length of tool {tool}" for tool in first))
     return replace(known, messages=(*followed.messages, *notes), assumed=assumed)
@@ -219,7 +219,7 @@ class Task:
         """Raise `NotInPartsError` if strategy or options need the whole program at once."""
         strategy = get_strategy(self.options.strategy)
         if strategy.corrects_orientation or not strategy.follows_path or self.machine.is_perfect:
-            raise NotInPartsError(f"the strategy {strategy.name} looks at the whole path at once")
+            raise NotInPartsError(f"the strategy {strategy.name} needs the whole path at once")
         if self.options.block_numbers == "renumber" and language_of(self.dialect, Language).renumber is not None:
             raise NotInPartsError("all blocks get new numbers")
 
@@ -272,7 +272,10 @@ def suspected(numbers: Numbers, step: float, path: str, force: bool, hint: str =
     """Raise RefusedError NCF438 if the program seems to have been corrected before; with `force`, only return it."""
     if not looks_corrected(numbers, step):
         return ()
-    text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
+    text = (
+        "has probably been corrected already: its numbers become round when the errors of this machine are added to "
+        "them"
+    )
     message = Message("NCF438", text, Place(path), hint)
     if not force:
         raise RefusedError((message,))
@@ -311,8 +314,8 @@ def refuse_stamped(program: Program, options: FixOptions) -> None:
     """Raise RefusedError NCF430 if the program carries a stamp, unless the options say `force`."""
     block = stamp.find(program)
     if block is not None and not options.force:
-        text = "the program has been corrected already; correcting it again would put the error back in"
-        raise RefusedError.of("NCF430", text, program.place(block), "fix the original program, or say --force")
+        text = "the program has been corrected already; a second correction would make the part wrong"
+        raise RefusedError.of("NCF430", text, program.place(block), "correct the original program, or use --force")
 
 
 SHORT_LINE = 250

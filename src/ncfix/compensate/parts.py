@@ -31,7 +31,7 @@ from ncfix.text.writer import Splices, left_alone
 from ncfix.values import frozen, mutable
 from ncfix.writer.pieces import SecondReading
 
-FRAMES = "the program takes frames or values from where the machine stands"
+FRAMES = "the program uses the position of the machine in frames or values"
 MOST_PENDING = 64
 """Largest number of stretches of text that are joined to find a part that ends at a permitted place (`_ends_clean`)."""
 
@@ -100,7 +100,7 @@ class Parts:
             if not last and not _ends_clean(*pending[-1]):
                 self._tell(None)
                 if len(pending) > MOST_PENDING:
-                    raise NotInPartsError("there is no place at which the program could be parted")
+                    raise NotInPartsError("the program cannot be divided into parts")
                 continue
             programs = [each for each, _ in pending]
             moves = joined_moves([each for _, each in pending], [len(each) for each in programs])

@@ -39,10 +39,10 @@ from ncfix.values import frozen, mutable
 if TYPE_CHECKING:
     from ncfix.control.flatten import Flat
 
-TIMED = "this turn of rotary axes alone, and others whose correction moves linear axes, get inverse time (G93)"
+TIMED = "this motion of rotary axes alone, and others whose correction moves linear axes, get inverse time (G93)"
 HAS_G93 = "check that the control has G93"
-STOPS = "this motion, and others under exact stop (G60, G61), are split: the control stops at the end of every piece"
-MARKS = "continuous path mode (G64) in the program, if a stop may leave marks"
+STOPS = "this motion and others under exact stop (G60, G61) are split: the control stops at the end of every piece"
+MARKS = "if stops may leave marks, program continuous path mode (G64)"
 SEEN_UM = 0.001
 """Difference, um, up to which two figures count as equal: they are taken at sample points and computed to 1 nm."""
 
@@ -139,10 +139,10 @@ class FixReport:
             return self
         if left > tolerance_um + self.rounding_um + SEEN_UM:
             text = (
-                f"{left:.2f} um are left here at the tool tip, more than the tolerance of {tolerance_um:g} um "
-                f"and the {self.rounding_um:.2f} um of the control's digits"
+                f"a tip error of {left:.2f} um is left here, more than the tolerance of {tolerance_um:g} um and the "
+                f"{self.rounding_um:.2f} um of the control's digits"
             )
-            hint = "the reason is a motion near it that is not corrected, or that the control works out by itself"
+            hint = "the reason is an adjacent motion that is not corrected, or that the control calculates"
             found.append(Message("NCF416", text, Place(self.path, int(line or 0)), hint))
         sides = [
             (self.error_before_um.get(figure) or 0.0, self.error_after_um.get(figure) or 0.0)
@@ -152,9 +152,9 @@ class FixReport:
             (max_before, max_after), (rms_before, rms_after) = sides
             text = (
                 f"the tip errors of this program grow: max {max_before:.2f} um and rms {rms_before:.2f} um before, "
-                f"max {max_after:.2f} um and rms {rms_after:.2f} um when it is corrected"
+                f"max {max_after:.2f} um and rms {rms_after:.2f} um after the correction"
             )
-            hint = "ask for a smaller --tolerance-um, or leave this program as it is"
+            hint = "use a smaller --tolerance-um, or the original program"
             found.append(Message("NCF418", text, Place(self.path), hint))
         return replace(self, warnings=(*self.warnings, *found))
 
@@ -363,7 +363,9 @@ def refusals(program: Program, account: Account) -> list[Refusal]:
     ]
 
 
-LEFT_OUT = "the flat program does not have them: correct another program in a file of its own"
+LEFT_OUT = (
+    "the flat program does not have them: if they are another program, put it in a file of its own and correct that"
+)
 """Hint about blocks that the program never goes through."""
 
 

@@ -122,8 +122,8 @@ class PrecedingMotion:
 
 
 RELATIVE_CYCLE = (
-    "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended; --flatten"
-    " writes it absolutely"
+    "the depth of a canned cycle with incremental words (G91) counts from the end of the cycle before it; --flatten "
+    "writes it as an absolute value"
 )
 NONE: Mapping[int, Reason] = MappingProxyType({})
 CODE_OF_RULE = "NCF432"
@@ -318,7 +318,7 @@ class Planning:
                 for k, row in enumerate(finding.moves.tolist()):
                     if stays[row]:
                         _explain(reasons, [int(moves.block[row])], finding.code, finding.sentence(k))
-            _explain(reasons, moves.block[stays].tolist(), CODE_OF_RULE, "no correction was found for it")
+            _explain(reasons, moves.block[stays].tolist(), CODE_OF_RULE, "no correction was found for this block")
             unchanged |= stays
             bound[beyond] = True
 

@@ -47,26 +47,24 @@ from ncfix.text.dialect import Dialect
 from ncfix.text.tree import Program
 
 UNKNOWN_AXIS = "NCF206"
-NEITHER = 'all motions after it are refused; if it does neither, say passed_codes = ["{}"] in the setup file'
-TAKEN = (
-    "it is among passed_codes, but its block has words of axes or H, which it may take: give them a block of their own"
-)
+NEITHER = 'all motions after it are refused; if it does neither, write passed_codes = ["{}"] in the setup file'
+TAKEN = "passed_codes lists it, but its block has axis words or H, which it may use: write them in a block of their own"
 
 MOVED_AS_A_WHOLE = "NCF280"
-AS_A_WHOLE = "{} is corrected where it is called, down to its bottom; what it mills there is moved as a whole"
+AS_A_WHOLE = "{} is corrected at its position and at its bottom; the shape that it mills is shifted as a whole"
 
-UNPLACED = "the program has not said where the axis {} stands, and this motion would need a word for it"
+UNPLACED = "the program has not yet given the position of the axis {}, and this motion needs a word for it"
 """Why a motion that moves an axis without naming it is passed or refused."""
 
 CUTTER_RIGHT = 42
 """G42: cutter radius compensation to the right of the path."""
-NOT_ACCOUNTED = "nothing is known that the control would make of the word {} in this block"
-AFTER_THAT = "where the axis {{}} stands is not known after this: {}"
+NOT_ACCOUNTED = "ncfix does not know what the control does with the word {} in this block"
+AFTER_THAT = "the position of the axis {{}} is not known after this: {}"
 BLOCKS_AFTER_MISSING_AXIS = 5000
 """Blocks followed after the program has moved an axis that the machine lacks, to collect further missing data."""
-ASTRAY = "where the axis {} stands after motions that were not followed is not known"
+ASTRAY = "the position of the axis {} after motions that were refused is not known"
 NO_UNIT = "NCF215"
-NO_UNIT_SAID = "the program does not say whether it is in inches or millimetres, and is taken as millimetres"
+NO_UNIT_SAID = "the program does not set its unit, inches or millimetres; ncfix assumes millimetres"
 MAX_AT_REST = 1e-9
 """Largest displacement, mm or rad, of an axis that is taken to stand still."""
 MIN_COSINE = 1 - 1e-12
@@ -262,7 +260,7 @@ class ProgramControl(ControlState):
         if not motion.passing:
             self._ask_for_start(motion)
             if not self.unit_said:
-                self.warn(NO_UNIT, NO_UNIT_SAID, f"put {self.unit_codes} at its beginning")
+                self.warn(NO_UNIT, NO_UNIT_SAID, f"program {self.unit_codes} at its beginning")
         if self.composed.unknown:
             self.places.lose(mask_of(self.composed.unknown))
         placed = self.placed_by(motion)
@@ -454,7 +452,7 @@ class ProgramControl(ControlState):
         if not reason and kind not in (MotionKind.RAPID, MotionKind.CYCLE) and self.unknown:
             reason = first_reason(self.unknown)
         if not reason and self.external:
-            reason = f"the motion is in the subprogram file {self.external}, which is not rewritten"
+            reason = f"the motion is in the subprogram file {self.external}, which ncfix does not rewrite"
         return self._style(kind, Rule.REFUSE if reason else Rule.CORRECT, reason, code)
 
     def note_foreign(self, letter: str, also: str = "") -> None:

@@ -77,7 +77,7 @@ class Flattener:
     def write(self, text: str, below: int = 0) -> None:
         """Append a line; its original is `below` lines after `line`. Raises `Fault` NCF238 beyond the limit."""
         if len(self.lines) >= self.limit:
-            hint = "a program so long is better corrected where it is made"
+            hint = "correct such a long program in the CAM system or post-processor"
             raise Fault(TOO_LONG, f"written out flat the program has more than {self.limit} lines", hint)
         self.lines.append(FlatLine(text, self.line + below))
 
@@ -186,7 +186,7 @@ def flatten(
     after = trace(flat, setup, axes, rotary, resolve, kinematics=kinematics).moves
     off = difference(before, after, steps)
     if off:
-        raise RefusedError.of(NOT_FLAT, f"written out flat the program would not mean the same: {off}")
+        raise RefusedError.of(NOT_FLAT, f"written out flat the program would not make the same motions: {off}")
     return Flat(flat, tuple(line.line for line in found))
 
 
@@ -208,4 +208,4 @@ def difference(before: Moves, after: Moves, steps: Mapping[str, float]) -> str:
     other |= told | (np.isnan(flat_ends) & ~np.isnan(ends)).any(axis=1)
     stands_in = (before.kind == MotionKind.ARC) & (before.sweep == 0) & (before.rule == Rule.REFUSE)
     other |= (before.kind[rows] != after.kind[flat]) & ~stands_in[rows] | (before.tcp[rows] != after.tcp[flat])
-    return f"motion {int(np.argmax(other)) + 1} of {len(rows)} would be another" if other.any() else ""
+    return f"motion {int(np.argmax(other)) + 1} of {len(rows)} would be different" if other.any() else ""

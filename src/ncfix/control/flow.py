@@ -20,8 +20,8 @@ from ncfix.control.expressions import Fault
 from ncfix.values import mutable
 
 ENDLESS = "NCF233"
-NEVER_ENDS = "the program never ends: it jumps back here again and again, and nothing changes in between"
-WAITS = "the program goes round here until something changes that only the machine knows"
+NEVER_ENDS = "the program never ends: it jumps back from this block again and again, and no value changes in between"
+WAITS = "the program repeats this loop until a value changes that is known only at run time"
 MAX_JUMPS_REMEMBERED = 100_000
 """Largest number of backward jumps remembered; the same jump from different calls counts separately."""
 
@@ -49,8 +49,8 @@ class BlockBudget:
     def foresee(self, blocks: int) -> None:
         """Raise `Fault` if `blocks` more would exceed the budget."""
         if blocks > self.left:
-            text = f"the program seems to be endless: it executes more than {self.most:,} blocks"
-            raise Fault(ENDLESS, text, "if it does end, most_blocks = ... in the setup file allows more")
+            text = f"the program probably never ends: it executes more than {self.most:,} blocks"
+            raise Fault(ENDLESS, text, "if it does end, set a larger most_blocks in the setup file")
 
 
 @mutable

@@ -130,8 +130,10 @@ class TextUnit(ABC, Generic[P]):
 NO_END = "NCF234"
 NEVER = "NCF249"
 SUBPROGRAM = "NCF258"
-AS_PROGRAM = "the program ends as a subprogram: it is taken as one of its own, which begins in the state of the setup"
-BY_ITSELF = "correct the program that calls it with --flatten, if the caller sets offsets, tools or positions"
+AS_PROGRAM = (
+    "the program ends like a subprogram; ncfix corrects it as a main program that starts in the state of the setup"
+)
+BY_ITSELF = "if a caller sets its offsets, tools or positions, correct the caller with --flatten"
 NAMES_AN_AXIS = re.compile(
     rb"(?i)(?!\d*[ \t]*(?:\*|(?:BEGIN|END|CALL)[ \t]+PGM\b))"
     rb"(?:\([^)\r\n]*\)|\"[^\"\r\n]*\"|[^(;%\"\r\n])*?"
@@ -240,11 +242,13 @@ class Interpreter(ABC, Generic[U]):
         if not (behind or jumped):
             return
         executed = self.executed.union(moves.block.tolist())
-        text = "behind the end of the program there are blocks that name axes; the program never goes through them"
-        hint = "they stay as they are: correct another program in a file of its own"
+        text = "after the end of the program there are blocks with axis words, which are never executed"
+        hint = "they are not corrected; if they are another program, put it in a file of its own and correct that"
         self._note_first(program, executed, behind, text, hint)
-        text = "the program jumps over blocks that name axes, and never goes through them"
-        hint = "they stay as they are: when it is to go through them, correct the original anew"
+        text = "the program jumps over blocks with axis words and never executes them"
+        hint = (
+            "they are not corrected; if the program is to execute them later, change the original and correct it again"
+        )
         self._note_first(program, executed, jumped, text, hint)
 
     def _note_first(

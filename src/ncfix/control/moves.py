@@ -362,60 +362,62 @@ PASS_RULES: Mapping[Pass, PassRule] = {
         "machine coordinates",
         STRAIGHT | {MotionKind.ARC},
         True,
-        "The program means places of the machine's axes (a tool changer, a limit), not places on the workpiece.",
+        "The program gives positions of the machine's axes (a tool changer, a travel limit), not positions on the "
+        "workpiece.",
     ),
     Pass.REFERENCE_POINT: PassRule(
-        "reference point", RAPIDS, False, "The machine goes to a place of its own, and cuts nothing."
+        "reference point", RAPIDS, False, "The machine moves to a fixed position and does not cut."
     ),
     Pass.PROBING: PassRule(
-        "probing", STRAIGHT, False, "It ends where the probe switches, and what it measures must stay comparable."
+        "probing", STRAIGHT, False, "It ends where the probe triggers, and measured values must stay comparable."
     ),
     Pass.UNSAID: PassRule(
-        "rapid while an axis has not been said",
+        "rapid while an axis position is not given",
         RAPIDS,
         False,
-        "Its correction would need a word for an axis that the program has not brought to a place of its own yet. It "
-        "cuts nothing, and the first block that names the axis is corrected.",
+        "Its correction needs a word for an axis whose position the program has not yet given. It does not cut, and "
+        "the first block that names the axis is corrected.",
     ),
     Pass.SKIPPED: PassRule(
-        "rapid behind a block with /",
+        "rapid after a block with /",
         RAPIDS,
         False,
-        "It needs another correction where that block is skipped than where it is executed. It cuts nothing, and no "
-        "cut begins where it ends.",
+        "It needs another correction if that block is skipped than if it is executed. It does not cut, and no cut "
+        "begins at its end.",
     ),
     Pass.LED: PassRule(
-        "rapid from where the control has led the tool",
+        "rapid from a position that the control calculates",
         RAPIDS,
         False,
-        "Only the control knows where it begins. It cuts nothing, and the next block that names the axes is corrected.",
+        "Only the control knows its start. It does not cut, and the next block that names the axes is corrected.",
     ),
     Pass.ALIGNMENT: PassRule(
         "rotary axes positioned by the control",
         RAPIDS,
         False,
-        "The control works out the angles (PLANE, CYCLE800, G53.1); the tip is corrected where it moves next.",
+        "The control calculates the angles (PLANE, CYCLE800, G53.1). The tool tip is corrected in the next motion.",
     ),
     Pass.ROTARY_ALONE: PassRule(
         "rotary axes alone in a tilted plane",
         STRAIGHT,
         True,
-        "Linear axes stand still, and words for them would mean the plane; the tip is corrected where it moves next.",
+        "The linear axes do not move, and words for them would count in the tilted plane. The tool tip is corrected "
+        "in the next motion.",
     ),
     Pass.RETRACTION: PassRule(
-        "retraction by the control", RAPIDS, False, "The control works out where it ends (M140). It cuts nothing."
+        "retraction by the control", RAPIDS, False, "The control calculates its end (M140). It does not cut."
     ),
     Pass.DEPARTURE: PassRule(
         "departure from a contour",
         frozenset({MotionKind.FEED}),
         True,
-        "The control goes on from the corrected end of the contour (DEP); no word says where that leads.",
+        "The control calculates its path from the corrected end of the contour (DEP). No word gives its end.",
     ),
 }
 """The complete list of pass rules."""
 
 
-AT_START = "where the axis {} stands when the program starts is not given"
+AT_START = "the position of the axis {} at the start of the program is not given"
 """Why a position is unknown at first; the setup is asked for it when it matters."""
 
 UnknownAxes = dict[int, str]

@@ -35,10 +35,10 @@ ALL_AXES = LETTERS
 """For `Lose`: all axes of the machine."""
 MOTION = re.compile(r"G0*[0-3]|G7[346]|G8[1-9]")
 """Codes whose words position axes and are rewritten."""
-LOST = "where the axis {{}} stands after {} is not known"
-NOT_FOLLOWED = "{} is in force, which ncfix does not follow"
-AFTER = "where the axis {{}} stands after {} is not followed"
-AFTER_MADE = "where the axis {} stands after motions that the control makes up is not followed"
+LOST = "the position of the axis {{}} after {} is not known"
+NOT_FOLLOWED = "{} is in force, which ncfix does not support"
+AFTER = "the position of the axis {{}} after {} is not known"
+AFTER_MADE = "the position of the axis {} after motions that the control generates is not known"
 
 
 Destination = Callable[[], MotionEnd]
@@ -77,7 +77,7 @@ class Operation(ABC):
 
 Given = str | float | tuple[str, float]
 """Source of a word of the family's code: another address, a number, or (address, number used without such a word)."""
-GIVEN = "a letter for a letter, a number, or both: (letter, number where the block has no such word)"
+GIVEN = "a letter for a letter, a number, or both: (letter, number if the block has no such word)"
 
 
 def source(given: Given) -> tuple[str | None, float | None]:
@@ -102,16 +102,18 @@ class Like(Operation):
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[GM]\d{1,4}(\.\d)?", self.code):
-            raise ValueError(f"like({self.code!r}): no code of a family: a capital G or M and its number")
+            raise ValueError(f"like({self.code!r}): not a code of a family: write a capital G or M and its number")
         for known, own in self.words:
             address, default = source(own)
             letters = (known,) if address is None else (known, address)
             fixed = isinstance(default, int | float) or (default is None and address is not None)
             if not fixed or any(not is_letters(each) or len(each) != 1 for each in letters):
-                raise ValueError(f"like({self.code!r}): {known}={own!r} cannot be: {GIVEN}")
+                raise ValueError(f"like({self.code!r}): {known}={own!r} is not allowed: {GIVEN}")
         places = {*LETTERS, *"IJKR"}
         if MOTION.fullmatch(self.code) and any(places & {known, source(own)[0]} for known, own in self.words):
-            raise ValueError(f"like({self.code!r}): the words of a motion's place are corrected, and stay as they are")
+            raise ValueError(
+                f"like({self.code!r}): the position words of a motion cannot be renamed, since ncfix corrects them"
+            )
 
     @property
     def given(self) -> dict[str, tuple[str | None, float | None]]:
@@ -153,7 +155,7 @@ class SetTool(Operation):
 
     def __post_init__(self) -> None:
         if not is_letters(self.address, LETTERS + NO_WORDS) or len(self.address) != 1:
-            raise ValueError(f"{self.address!r} cannot be the address of a tool: one letter, of no axis")
+            raise ValueError(f"{self.address!r} cannot be the address of a tool: one letter that is not an axis letter")
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
@@ -163,7 +165,7 @@ class SetTool(Operation):
         control.places.lose(mask_of(control.axis_indices))
 
     def __str__(self) -> str:
-        return f"the tool {self.address} comes into the spindle"
+        return f"the tool {self.address} is changed into the spindle"
 
 
 @frozen
@@ -181,7 +183,7 @@ class Lose(Operation):
 
     def __post_init__(self) -> None:
         if not is_letters(self.axes) or not {*self.axes} <= INDEX.keys():
-            raise ValueError(f"{self.axes!r} are no axes: letters of {LETTERS}, or ALL_AXES")
+            raise ValueError(f"{self.axes!r} are not axes: use letters of {LETTERS}, or ALL_AXES")
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""
@@ -190,7 +192,7 @@ class Lose(Operation):
 
     def __str__(self) -> str:
         axes = "the axes" if self.axes == ALL_AXES else f"the axes {' '.join(self.axes)}"
-        return f"where {axes} stand after {self.after} is not known"
+        return f"the position of {axes} after {self.after} is not known"
 
 
 @frozen
@@ -207,7 +209,7 @@ class Rapid(Operation):
                 control.make(Motion(MotionKind.RAPID, block.axes, end, 0))
 
     def __str__(self) -> str:
-        return "the axes go to the words of the block in rapid"
+        return "the axes move to the position of the block in rapid"
 
 
 def make_up(control: ProgramControl, block: BlockValues, what: str, turned: Collection[int] = ()) -> None:
@@ -239,7 +241,7 @@ class MakeUp(Operation):
         make_up(control, block, self.what)
 
     def __str__(self) -> str:
-        return f"the control makes up its motion, which is refused: {self.what}"
+        return f"the control generates the motion, which is refused: {self.what}"
 
 
 @frozen
@@ -255,7 +257,9 @@ class SetLength(Operation):
 
     def __post_init__(self) -> None:
         if self.address and (not is_letters(self.address, LETTERS + NO_WORDS) or len(self.address) != 1):
-            raise ValueError(f"{self.address!r} cannot be the address of a tool length: one letter, of no axis")
+            raise ValueError(
+                f"{self.address!r} cannot be the address of a tool length: one letter that is not an axis letter"
+            )
 
     def carry_out(self, control: ProgramControl, block: BlockValues, destination: Destination) -> None:
         """See `Operation`."""

@@ -115,8 +115,10 @@ def check_offsets(setup: Setup, axes: Collection[str], typed: Collection[str] = 
             behind = LETTERS[LETTERS.index(letter) + 1 :]
             meant = system in typed or any(axis in axes and axis not in values for axis in behind)
             if value and letter not in axes and meant:
-                text = f"work offset {system}: {letter} is {value:g}, and the machine has no axis {letter}"
-                hint = f"numbers are {' '.join(LETTERS)} on any machine, with decimal points; or name the axes: "
+                text = f"work offset {system}: {letter} is {value:g}, but the machine has no axis {letter}"
+                hint = (
+                    f"a list of numbers is {' '.join(LETTERS)} on any machine, with decimal points; or name the axes: "
+                )
                 hint += f"--offset {system}=Z60" if system in typed else f"{system} = {{ Z = 60 }}"
                 raise UsageError.of("NCF384", text, hint=hint)
 
@@ -150,11 +152,11 @@ class SetupLookup:
         `what` names it ("work offset G54"), `verb` says how it is involved ("is used"), `option` how to give it.
         """
         if self.setup.assume_zero:
-            text = f"{what} is not given and is taken as zero"
+            text = f"{what} is not given; ncfix uses zero"
             self.assumed.setdefault(what, Message(ASSUMED, text, self.place(), option))
             return
         hint = f"{option} or --assume-zero"
-        self.missing.setdefault(what, Message(code, f"{what} {verb} and not given", self.place(), hint))
+        self.missing.setdefault(what, Message(code, f"{what} {verb} but not given", self.place(), hint))
 
     def work_offset(self, system: str) -> None:
         """Record that a work offset is used and not given."""
@@ -187,7 +189,10 @@ class SetupLookup:
 
     def probing(self) -> None:
         """Record that the program uses results of probing, which count as nominal."""
-        text = "probing counts as ending where the setup says; what is computed from its results stays as it is"
+        text = (
+            "ncfix uses the positions of the setup as the results of probing; words that are calculated from them "
+            "stay unchanged"
+        )
         self.assumed.setdefault(PROBED, Message(ASSUMED, text, self.place(), "without --probed this is refused"))
 
     def reference_point(self, code: str) -> None:

@@ -69,7 +69,7 @@ def _each(
             if not pattern.fullmatch(plain):
                 table.note(UNKNOWN_KEY, own, wrong, hint)
             elif plain in found:
-                table.note(UNKNOWN_KEY, own, f"{plain} is there twice")
+                table.note(UNKNOWN_KEY, own, f"{plain} appears twice")
             found[plain] = reader(table, own)
         return found
 
@@ -141,7 +141,7 @@ def _position(table: TomlTable, key: str) -> dict[str, float | None]:
         return {}
     for letter in axes.values:
         if letter.upper() not in tuple(LETTERS):
-            axes.note(UNKNOWN_KEY, letter, "no axis letter", f"they are {' '.join(LETTERS)}")
+            axes.note(UNKNOWN_KEY, letter, "not an axis letter", f"they are {' '.join(LETTERS)}")
     return {letter.upper(): axes.number(letter) for letter in axes.values}
 
 
@@ -162,7 +162,7 @@ def _tools(root: TomlTable, key: str) -> dict[str, Tool]:
         return {}
     for name in table.values:
         if not TOOL.match(name):
-            table.note(UNKNOWN_KEY, name, "no tool number")
+            table.note(UNKNOWN_KEY, name, "not a tool number")
     return {name.strip().upper(): _tool(table, name) for name in table.values}
 
 
@@ -178,11 +178,11 @@ def _tool(table: TomlTable, key: str) -> Tool:
 
 
 READERS: dict[str, Callable[[TomlTable, str], Any]] = {
-    "work_offsets": _each(WORK_OFFSET, "no work offset", "they are G54 ... G59.3, and G54.1P1 ...", _offset),
+    "work_offsets": _each(WORK_OFFSET, "not a work offset", "they are G54 ... G59.3, and G54.1P1 ...", _offset),
     "tools": _tools,
     "initial": _position,
-    "references": _each(re.compile("G28|G30|M92"), "no reference point", "they are G28, G30 and M92", _position),
-    "variables": _each(VARIABLE, "no parameter", 'they are written "#100" or "#<name>"', TomlTable.number),
+    "references": _each(re.compile("G28|G30|M92"), "not a reference point", "they are G28, G30 and M92", _position),
+    "variables": _each(VARIABLE, "not a parameter", 'they are written "#100" or "#<name>"', TomlTable.number),
     "inputs": _each(re.compile(".*", re.DOTALL), "", "", TomlTable.number),
     "workpiece_offset": lambda root, key: root.numbers(key, count=3),
     "tcp": TomlTable.flag,

@@ -150,7 +150,7 @@ class Tools:
 
 
 BLOCK_DELETE = "NCF235"
-TOOL_AT_RUN_TIME = "which tool is in the spindle is known only at run time, and no length offset says how long it is"
+TOOL_AT_RUN_TIME = "which tool is in the spindle is known only at run time, and no length offset gives its length"
 XYZ = (X, Y, Z)
 SPATIAL = 1 << X | 1 << Y | 1 << Z
 

@@ -29,7 +29,7 @@ MACHINE = TcpState(False, 0.0)
 EQUAL_TOLERANCE = 1e-7
 """Largest difference, mm and rad, of positions that are equal except for rounding."""
 
-TURNED = "where the axis {} stands in tool-centre-point coordinates depends on the machine's kinematics"
+TURNED = "the position of the axis {} in tool-centre-point coordinates depends on the machine's kinematics"
 
 
 def rotary_at_zero(control: ControlState, position: Vector, unknown: UnknownAxes) -> bool:

@@ -229,7 +229,7 @@ class Follower:
         interpreter.last = last
         interpreter.run()
         if control.switches:
-            raise NotInPartsError("blocks with / may be skipped, and all positions of block delete are looked at")
+            raise NotInPartsError("blocks with / may be skipped, and ncfix checks all positions of block delete")
         moves = control.moves()
         check_reach(program, moves)
         control.note_rolling(program)
@@ -298,8 +298,13 @@ def check_reach(program: Program, moves: Moves) -> None:
     far[arcs] |= _are_far(moves.centre[arcs])
     rows = np.flatnonzero(far & (moves.rule != Rule.REFUSE))
     if rows.size:
-        text = "this leads farther away than any machine goes (1e9 mm or radians)"
-        raise SourceError.of(TOO_FAR, text, program.place(int(moves.block[rows[0]])), "check the numbers of the block")
+        text = "this position is beyond 1e9 mm or 1e9 radians"
+        raise SourceError.of(
+            TOO_FAR,
+            text,
+            program.place(int(moves.block[rows[0]])),
+            "check the numbers of the block, and the increments, shifts and scale factors before it",
+        )
 
 
 def _are_far(places: Array) -> Mask:

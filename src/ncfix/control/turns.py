@@ -28,8 +28,8 @@ from ncfix.control.moves import FeedMode, MotionKind, Moves
 from ncfix.values import mutable
 
 UNTIMED = (
-    "rotary axes turn alone, and the time that takes is not known: their feed is no plain number, or was not given"
-    " since inch or mm came into force"
+    "rotary axes turn alone, and the duration is not known: their feed rate is not a plain number, or was not "
+    "programmed since inch or mm came into force"
 )
 
 
@@ -76,11 +76,13 @@ ZERO_ANGLE_RAD = 1e-9
 """Largest angle, rad, that counts as zero."""
 
 ROLLED = {
-    "a rotary axis turns by half a turn or more here: a control with roll-over goes the other way, and such motions are"
-    " corrected at their ends and not split": "write such a turn in two blocks, if it is meant to go the longer way",
-    "a rotary axis was led beyond a full turn or below zero, and here it comes back: a control that counts from 0 to"
-    " 360 degrees may go another way, and such motions are corrected at their ends and not split": (
-        "say which way it is meant to go: ACP, ACN or DC"
+    "a rotary axis turns by half a turn or more: a control with roll-over turns in the other direction, so ncfix "
+    "corrects the ends of such motions and does not split them": (
+        "if the axis must turn in the longer direction, write the turn in two blocks"
+    ),
+    "a rotary axis was moved beyond 360 degrees or below zero, and turns back here: a control that counts from 0 to "
+    "360 degrees may turn in the other direction, so ncfix corrects the ends of such motions and does not split them": (
+        "program the direction: ACP, ACN or DC"
     ),
 }
 """Messages on axes that turn half a turn or more, and on axes that come back from beyond a full turn, with hints."""

@@ -92,7 +92,9 @@ FIXED = frozenset({"G0", "G1", "G2", "G3", "G17", "G18", "G19", "G20", "G21", "G
 COMMENT = re.compile(r"\([^(){}]*\{\}[^(){}]*\)|;[^{}\r\n]*\{\}[^{}\r\n]*")
 """Forms of comments allowed in the families: their readers know `(...)` and `;`, whatever the grammar."""
 
-HINTS = {LATHE: "lathe programs are followed where they say what X is: LinuxCNC (G7, G8), Siemens (DIAMON, DIAMOF)"}
+HINTS = {
+    LATHE: "ncfix reads lathe programs that define whether X is a diameter: LinuxCNC (G7, G8), Siemens (DIAMON, DIAMOF)"
+}
 """Hints for languages refused by name, where naming the dialect would not help."""
 
 
@@ -381,7 +383,12 @@ def other_control(dialect: Dialect, control: str, path: str) -> Message | None:
     if own is None or (own.variant_of or own.name) == (dialect.variant_of or dialect.name):
         return None
     text = f"this is {dialect.title}, and the control of the machine file is {control}"
-    return Message("NCF106", text, Place(path), f"is it the right machine file? --dialect {dialect.name} says so")
+    return Message(
+        "NCF106",
+        text,
+        Place(path),
+        f"check that it is the right machine file; --dialect {dialect.name} confirms the language",
+    )
 
 
 def signature_rank(dialect: Dialect, head: bytes) -> int | None:
@@ -399,7 +406,7 @@ def goes_back(block: bytes, dialect: Dialect) -> bool:
 UTF8_MARK = b"\xef\xbb\xbf"
 UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
-ANOTHER = "--dialect NAME, if it is for another control than the machine's; `ncfix dialects` lists them"
+ANOTHER = "--dialect NAME, if the program is for another control than the machine's; `ncfix dialects` lists the names"
 
 OTHER_FILES = {
     "machine file": rb"(?m)^[ \t]*topology[ \t]*=[ \t]*[\"']",
@@ -424,9 +431,14 @@ def check_content(source: bytes, path: str, dialect: Dialect) -> None:
         raise SourceError.of("NCF101", "the text is UTF-16", Place(path, 1), "save it as ASCII, Latin-1 or UTF-8")
     check_zeros(source, path)
     if not source.removeprefix(UTF8_MARK).strip():
-        raise SourceError.of("NCF102", "there is no block in the program", Place(path))
+        raise SourceError.of("NCF102", "the program has no blocks", Place(path))
     if other := next((kind for kind, sign in OTHER_FILES.items() if re.search(sign, source[:PROBE_BYTES])), ""):
-        raise SourceError.of("NCF103", f"this is a {other}, not a program", Place(path), "-m and --setup name others")
+        raise SourceError.of(
+            "NCF103",
+            f"this is a {other}, not a program",
+            Place(path),
+            "give machine and setup files with -m and --setup",
+        )
     code = beginning_without_comments(source)
     for family, pattern in dialect.foreign:
         found = re.search(pattern, code)
@@ -473,7 +485,7 @@ def encoded(text: str, path: str) -> bytes:
         before, char = text[: error.start], text[error.start]
         place = Place(path, before.count("\n") + 1, error.start - before.rfind("\n"))
         hint = "give the text as bytes, as the control has it"
-        raise SourceError.of("NCF101", f"{char!r} is no character of Latin-1", place, hint) from error
+        raise SourceError.of("NCF101", f"{char!r} is not a character of Latin-1", place, hint) from error
 
 
 def header_length(source: bytes) -> int:

@@ -27,11 +27,11 @@ OPERATORS = "compare with EQ, NE, GT, GE, LT or LE"
 JOINED = "[[#1 EQ 1] AND [#2 EQ 2]] joins two comparisons"
 
 HINTS = {
-    "/": "block skip stands at the start of the block",
-    "N": "the line number stands first in the block",
-    "O": "an O-word stands first in the block",
+    "/": "the block skip / must be at the start of the block",
+    "N": "the line number must be first in the block",
+    "O": "an O-word must be first in the block",
     "=": "words are written without = in this dialect",
-    "%": "the tape mark stands alone on its line",
+    "%": "the tape mark % must be alone on its line",
 }
 NUMERIC = frozenset("0123456789.")
 SIGNS = frozenset("+-")
@@ -99,14 +99,14 @@ class Stop:
 
 def bare_expression(place: int) -> BlockError:
     """The error that an expression has no brackets."""
-    text = "in this dialect an expression stands in brackets [ ]"
-    return BlockError("NCF110", text, place, "--dialect fanuc, if the control takes it without them")
+    text = "this dialect needs brackets [ ] around an expression"
+    return BlockError("NCF110", text, place, "--dialect fanuc, if the control accepts it without brackets")
 
 
 def in_comment(stop: Stop) -> BlockError | None:
     """Errors of comments: not closed, not opened, or nested."""
     if stop.at == ")":
-        return stop.fault("NCF111", "no comment is open that this ) could close")
+        return stop.fault("NCF111", "this ) has no ( before it")
     if stop.at != "(":
         return None
     inner, end = stop.rest.find("(", 1), stop.rest.find(")")
@@ -141,12 +141,12 @@ def in_expression(stop: Stop) -> BlockError | None:
     if stop.before in SIGNS:
         return stop.fault("NCF115", "the sign has no number after it", back=1)
     if function := FUNCTIONS.search(done):
-        text = f"{function[0]!r} takes what it works on in brackets [ ]"
+        text = f"{function[0]!r} needs its argument in brackets [ ]"
         return stop.fault("NCF110", text, back=len(function[0]))
     if re.search(r"atan\[[^\[\]]*\]\Z", done, re.IGNORECASE):
-        return stop.fault("NCF110", "ATAN takes two values", "write ATAN[..]/[..]")
+        return stop.fault("NCF110", "ATAN needs two values", "write ATAN[..]/[..]")
     if re.search(r"exists\[\Z", done, re.IGNORECASE):
-        return stop.fault("NCF110", "EXISTS takes a parameter", "write EXISTS[#<name>]")
+        return stop.fault("NCF110", "EXISTS needs a parameter", "write EXISTS[#<name>]")
     if stop.at.isalpha() and unmatched(done):
         return in_expression_word(stop)
     return None
@@ -159,21 +159,21 @@ def in_expression_word(stop: Stop) -> BlockError:
     if name and name[0].upper() in COMPARISONS:
         return stop.fault("NCF110", f"{shown} is a second comparison without brackets", JOINED)
     if stop.before in {*NUMERIC, "]", ">"} and unmatched(stop.squeezed.code) == []:
-        return stop.fault("NCF110", f"{shown} is no operator", OPERATORS)
+        return stop.fault("NCF110", f"{shown} is not an operator", OPERATORS)
     if unmatched(stop.squeezed.code):
         return stop.not_closed()
-    return stop.fault("NCF110", f"{shown} is no function")
+    return stop.fault("NCF110", f"{shown} is not a function")
 
 
 def in_brackets(stop: Stop) -> BlockError | None:
     """Errors of brackets: not matching, empty, or with an operator of another language in them."""
     open_before = unmatched(stop.squeezed.code[: stop.position])
     if stop.at == "]" and not open_before:
-        return stop.fault("NCF113", "no bracket is open that this ] could close")
+        return stop.fault("NCF113", "this ] has no [ before it")
     if stop.at == "]" and stop.before == "[":
-        return stop.fault("NCF114", "there is nothing between the brackets", back=1)
+        return stop.fault("NCF114", "the brackets are empty", back=1)
     if open_before and stop.at and stop.at in "<>=!&|" and stop.before != "#":
-        return stop.fault("NCF110", f"{stop.at!r} is no operator", OPERATORS)
+        return stop.fault("NCF110", f"{stop.at!r} is not an operator", OPERATORS)
     if open_before and unmatched(stop.squeezed.code):
         return stop.not_closed()
     return None
@@ -198,29 +198,31 @@ def in_flow(stop: Stop) -> BlockError | None:
     keyword = start["keyword"]
     place = stop.squeezed.places[start.start("keyword")] if keyword else 0
     if keyword.lower() in KEYWORDS and stop.position < start.end("keyword"):
-        return BlockError("NCF119", "this dialect has no flow control with O-words", place, "--dialect linuxcnc has")
+        return BlockError(
+            "NCF119", "this dialect has no O-words for flow control", place, "--dialect linuxcnc reads them"
+        )
     if stop.position < start.start("keyword"):
         return None
     if not keyword:
-        return stop.fault("NCF119", "after the O-word a keyword is missing", f"one of {', '.join(KEYWORDS)}")
+        return stop.fault("NCF119", "there is no keyword after the O-word", f"one of {', '.join(KEYWORDS)}")
     if stop.position >= start.end("keyword"):
-        what = f"{stop.at!r} cannot follow {keyword!r}" if stop.at else f"after {keyword!r} an expression is missing"
-        return stop.fault("NCF119", what, "arguments stand in brackets [ ]")
-    return BlockError("NCF119", f"{keyword!r} is no keyword of flow control", place, f"one of {', '.join(KEYWORDS)}")
+        what = f"{stop.at!r} cannot follow {keyword!r}" if stop.at else f"there is no expression after {keyword!r}"
+        return stop.fault("NCF119", what, "arguments must be in brackets [ ]")
+    return BlockError("NCF119", f"{keyword!r} is not a keyword of flow control", place, f"one of {', '.join(KEYWORDS)}")
 
 
 def in_word(stop: Stop) -> BlockError | None:
     """Errors of words: an address, a parameter or an `=` without its value; text that is no word."""
     if (macro := MACRO_B.match(stop.text)) and stop.place() < macro.end("keyword"):
         text = "this is flow control of another dialect (Macro B)"
-        return BlockError("NCF110", text, macro.start("keyword"), "name it with --dialect")
+        return BlockError("NCF110", text, macro.start("keyword"), "select it with --dialect")
     if stop.before == "=":
         return stop.fault("NCF114", "there is no value after =", back=1)
     if stop.before == "#":
         text = "the name is not closed with >" if stop.at == "<" else "there is no parameter number after #"
         return stop.fault("NCF114", text, back=1)
     if not stop.at and re.search(r"#(\d+|<[^<>]*>)\Z", stop.squeezed.code):
-        return stop.fault("NCF114", "the parameter gets no value", "write = and a value")
+        return stop.fault("NCF114", "the parameter has no value", "write = and a value")
     if stop.before.isalpha() and stop.before.isascii() and stop.at != "=":
         return in_address(stop)
     return None
@@ -231,14 +233,14 @@ def in_address(stop: Stop) -> BlockError:
     address = stop.before.upper()
     prose = re.match(r"[A-Za-z_]{3,}", stop.text[stop.place(1) :])
     if prose:
-        return stop.fault("NCF110", f"{prose[0][:40]!r} is no word of this dialect", back=1)
+        return stop.fault("NCF110", f"{prose[0][:40]!r} is not a word of this dialect", back=1)
     if re.search(r"(?i)GOTO\Z", stop.squeezed.code[: stop.position]):
-        return stop.fault("NCF110", "GOTO takes the number of a block, without N")
+        return stop.fault("NCF110", "GOTO needs the number of a block, without N")
     if address == "O":
-        text = "the name is not closed with >" if stop.at == "<" else "the O-word has no number or name"
+        text = "the name is not closed with >" if stop.at == "<" else "the O-word has no number and no name"
         return stop.fault("NCF119", text, back=1)
     if address == "N" and stop.at:
-        return stop.fault("NCF114", "the line number is no plain number", back=1)
+        return stop.fault("NCF114", "the line number is not a plain number", back=1)
     return stop.fault("NCF114", f"the word {address} has no value", back=1)
 
 
@@ -247,6 +249,6 @@ def unexpected(stop: Stop) -> BlockError:
     if not stop.at:
         return stop.fault("NCF110", "the block is not complete")
     if stop.at == "\r":
-        return stop.fault("NCF110", "there is a carriage return within the line", "make all line ends alike")
+        return stop.fault("NCF110", "there is a carriage return within the line", "write all line ends the same way")
     shown = repr(stop.at) if stop.at.isprintable() and stop.at.isascii() else f"byte 0x{ord(stop.at):02X}"
     return stop.fault("NCF110", f"{shown} is not expected here", HINTS.get(stop.at.upper(), ""))

@@ -140,5 +140,5 @@ def loaded(dialect: Dialect) -> Language:
         raise useless("dialects", dialect.name, text, nearest(dialect.semantics, language.semantics))
     if (dialect.codes or dialect.cycles or dialect.keywords) and not language.own_codes:
         text = f"the dialect {dialect.name!r} has codes of its own, and its language takes none"
-        raise useless("dialects", dialect.name, text, "languages of the RS274 and Fanuc families take them")
+        raise useless("dialects", dialect.name, text, "languages of the RS274 and Fanuc families accept them")
     return language

@@ -43,7 +43,7 @@ def tape_end(source: bytes, blocks: Ints) -> int:
     tape.
     """
     leader = LEADER.match(source, int(blocks[0, 0]))
-    assert leader is not None, "it matches nothing, too"
+    assert leader is not None, "it also matches an empty text"
     marks = np.flatnonzero(np.frombuffer(source, dtype=np.uint8) == ord("%"))
     for block in dict.fromkeys((np.searchsorted(blocks[:, 0], marks, side="right") - 1).tolist()):
         start, stop = blocks[block]

@@ -256,7 +256,7 @@ class ProgramReading:
             return known
         try:
             if limit and len(text) > limit:
-                long = f"the line has {len(text)} characters; {self.dialect.title} takes {limit}"
+                long = f"the line has {len(text)} characters; {self.dialect.title} accepts {limit}"
                 raise BlockError("NCF105", long, limit, "break the line or shorten its comment")
             return parse_block(self.dialect, text.decode("latin-1"))
         except BlockError as fault:

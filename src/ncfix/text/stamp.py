@@ -32,8 +32,8 @@ def find(program: Program) -> int | None:
 
 def remark(place: Place) -> Message:
     """The warning NCF430: the program has a stamp, and its corrected numbers are taken as the intended ones."""
-    text = "the program has been corrected already, and its corrected numbers are taken for what is meant"
-    return Message("NCF430", text, place, "give the original program")
+    text = "the program has been corrected already; ncfix takes its corrected numbers as the intended path"
+    return Message("NCF430", text, place, "use the original program")
 
 
 def insertion(program: Program, text: str) -> Edit:

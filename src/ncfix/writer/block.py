@@ -36,10 +36,10 @@ FULL_CIRCLE_STEPS = 2.0
 
 INVERSE_TIME, PER_MINUTE = "93", "94"
 
-FROM_NOWHERE = "an increment in turned coordinates, while where one of their axes stands is not known"
-TOO_SHORT = "the motion takes so little time that its F in inverse time (G93) would be larger than {:.10g}"
-OTHER_WAY = "from a corrected start the control would turn the rotary axes another way to this direction of the tool"
-NO_TIME = "the block would become several, and in G93 no number behind its own F says how long it takes"
+FROM_NOWHERE = "an increment in rotated coordinates, while the position of one of their axes is not known"
+TOO_SHORT = "the motion is so short that its F in inverse time (G93) would be larger than {:.10g}"
+OTHER_WAY = "from a corrected start the control would turn the rotary axes another way to this tool direction"
+NO_TIME = "the block must be split, and in G93 this needs an F word with a plain number in the block"
 
 
 class BlockWriter(BlockText):

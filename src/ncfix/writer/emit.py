@@ -28,9 +28,12 @@ from ncfix.writer.target import TANGENTIAL, FrameMap, Rendered, RetractLevels, T
 
 NOWHERE = np.full(3, np.nan)
 SEVERAL_STATES = "the block is executed from several states that need different corrections"
-FLOW = "the block is more than words"
-TOO_LONG = "the corrected line would have {} characters, and the control takes {}"
-MODE_LOST = "written as lines it would leave G1 in force, and a block behind it that stays as it was has no G code"
+FLOW = "the block has text that is not plain words"
+TOO_LONG = "the corrected line would have {} characters, but the control accepts {}"
+MODE_LOST = (
+    "written as lines it would leave G1 in force, and a later block without a G code, which must stay unchanged, "
+    "depends on the code of this block"
+)
 
 
 @frozen

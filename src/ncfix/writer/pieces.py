@@ -102,8 +102,8 @@ class SecondReading:
         return cls(moves.frame[last], moves.frames, moves.start[pieces.first], moves.end[last])
 
 
-PINNED = "a refused arc that follows starts from its end"
-BEYOND_TRAVEL = "a refused increment that follows would leave the travel"
+PINNED = "a refused arc after it starts from its end"
+BEYOND_TRAVEL = "a refused increment after it would leave the travel"
 UNIT_NORMAL_TOLERANCE = 1e-9
 """Distance from 1 within which a component of a unit normal counts as 1."""
 

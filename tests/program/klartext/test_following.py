@@ -54,7 +54,7 @@ def test_tool_length_and_preset_are_added() -> None:
 
 def test_a_tool_of_run_time_may_be_any_tool_that_the_program_has_defined() -> None:
     ask = "FN 18: SYSREAD Q1 = ID20 NR1\n"
-    with pytest.raises(UsageError, match="length of tool 7 is used and not given"):
+    with pytest.raises(UsageError, match="length of tool 7 is used but not given"):
         follow(f"TOOL DEF 7 L+30\n{ask}TOOL DEF Q1 L+40\nTOOL CALL 7 Z\nL Z+3 FMAX", setup=Setup())
     setup = Setup(work_offsets={"PRESET": {}}, initial=dict.fromkeys("XYZ", 0.0))
     text = f"{ask}TOOL DEF Q1 L+40\nTOOL DEF 7 L+30\nTOOL CALL 7 Z\nL Z+3 FMAX"
@@ -65,9 +65,9 @@ def test_what_is_not_given_is_asked_for() -> None:
     with pytest.raises(UsageError) as error:
         follow("TOOL CALL 4 Z\nL X+1 Y+1 Z+1 FMAX\nCYCL DEF 247 PRESET Q339=+3\nL X+2", setup=Setup())
     assert [message.text for message in error.value.messages] == [
-        "length of tool 4 is used and not given",
-        "the active preset is used and not given",
-        "preset 3 is used and not given",
+        "length of tool 4 is used but not given",
+        "the active preset is used but not given",
+        "preset 3 is used but not given",
     ]
 
 
@@ -210,13 +210,13 @@ def test_mirrored_arcs_turn_the_other_way() -> None:
         ("CYCL DEF 10.0 R\nCYCL DEF 10.1 ROT+30\nCYCL DEF 7.0 D\nCYCL DEF 7.1 X+1\nL X+1 Y+0 Z+0", "datum shift while"),
         ("CYCL DEF 8.0 M\nCYCL DEF 8.1 X\nCYCL DEF 10.0 R\nCYCL DEF 10.1 ROT+30\nL X+1 Y+0 Z+0", "mirror and rotation"),
         ("CYCL DEF 26.0 S\nCYCL DEF 26.1 X 0.5 Y 1\nL X+1", "single axes"),
-        ("CYCL DEF 7.0 D\nCYCL DEF 7.1 #5\nL X+1", "from a table"),
+        ("CYCL DEF 7.0 D\nCYCL DEF 7.1 #5\nL X+1", "from a datum table"),
         ("CYCL DEF 22 ROUGH-OUT Q10=5\nL X+1 Y+1 M99", "cycle 22 makes a path"),
         ("L X+Q1", "known only at run time"),
         ("FC DR+ R5 X+10", "free contour"),
         ("TOOL CALL 1 Y\nL X+1", "tool axis is Y"),
-        ("L X+1 F100\nG91 G28 Z0", "no Klartext"),
-        ("LN X1 Y2 Z3 TX0 TY0 TZ1", "works out the rotary axes"),
+        ("L X+1 F100\nG91 G28 Z0", "not Klartext"),
+        ("LN X1 Y2 Z3 TX0 TY0 TZ1", "calculates the rotary axes"),
         ("CC X+0 Y+0\nL X+10 Y+0 F1\nC X+0 Y+10.1 DR+", "does not close"),
         ("FUNCTION TCPM F TCP AXIS SPAT PATHCTRL AXIS\nL X+1", "spatial angles"),
         ("M114\nL X+1", "M114"),
@@ -231,9 +231,9 @@ def test_what_is_not_sure_is_refused(body: str, reason: str) -> None:
 
 
 def test_a_surface_normal_turns_the_tool_under_m128_only() -> None:
-    """TNC7 manual, face milling: without TX TY TZ, M128 holds the tool square to the surface."""
+    """TNC7 manual, face milling: without TX TY TZ, M128 holds the tool normal to the surface."""
     normal = "L A0 C0 F100\n%sLN X1 Y2 Z3 %sNX0 NY0.6 NZ0.8"
-    assert "square to the surface" in reasons(normal % ("M128\n", ""), "XYZAC")[-1]
+    assert "normal to the surface" in reasons(normal % ("M128\n", ""), "XYZAC")[-1]
     assert reasons(normal % ("", ""), "XYZAC") == []
     assert reasons(normal % ("M128\n", "A5 C9 "), "XYZAC") == []
 
@@ -269,12 +269,12 @@ def test_where_the_control_would_stop(body: str, code: str) -> None:
 @pytest.mark.parametrize(
     ("set_by", "hint"),
     [
-        ("", 'variables."Q5" in the setup file'),
-        ("Q5 = Q9 + 1", 'variables."Q9" in the setup file'),
-        ("Q5 = Q5 + 1", 'variables."Q5" in the setup file'),
+        ("", 'give its value as variables."Q5" in the setup file'),
+        ("Q5 = Q9 + 1", 'give its value as variables."Q9" in the setup file'),
+        ("Q5 = Q5 + 1", 'give its value as variables."Q5" in the setup file'),
         ("FN 18: SYSREAD Q5 = ID990 NR6", "the program reads or measures it"),
         ("FN 18: SYSREAD Q9 = ID990 NR6\nQ5 = Q9 + 1", "the program reads or measures it"),
-        ("TOOL CALL 5 Z\nQ5 = Q108 * 2", "it is the radius of the tool"),
+        ("TOOL CALL 5 Z\nQ5 = Q108 * 2", "Q108 is the tool radius"),
     ],
 )
 def test_what_decides_a_jump_is_named_by_what_it_comes_from(set_by: str, hint: str) -> None:

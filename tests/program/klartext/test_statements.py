@@ -27,20 +27,20 @@ def test_words_of_an_m_code_are_no_words_of_the_motion(code: str) -> None:
 
 @pytest.mark.parametrize("block", ["L X+1 X+2", "L X+1 IX+2", "LP PR+5 IPR+1", "L Z-1 Y+2 Z-3"])
 def test_an_axis_that_is_said_twice_is_an_error_of_the_block(block: str) -> None:
-    assert "no Klartext" in fates(f"CC X+0 Y+0\nL X+5 Y+5 Z+5 FMAX\n{block}")[-1][1]
+    assert "not Klartext" in fates(f"CC X+0 Y+0\nL X+5 Y+5 Z+5 FMAX\n{block}")[-1][1]
 
 
 @pytest.mark.parametrize(
     "block", ["CR X+10 Y+40 DR+ R+45 R-45", "CTP PR+20 IPA-60 R+25 R-25", "APPR CT X+10 Y+40 CCA90 R+5 CCA45 RL"]
 )
 def test_a_size_of_an_arc_that_is_said_twice_is_an_error_of_the_block(block: str) -> None:
-    assert "no Klartext" in fates(f"L X+8 Y+20 Z+3 FMAX\nCC X+30 Y+20\nL X+10 F200\n{block}")[-1][1]
+    assert "not Klartext" in fates(f"L X+8 Y+20 Z+3 FMAX\nCC X+30 Y+20\nL X+10 F200\n{block}")[-1][1]
 
 
 def test_m94_and_m138_name_axes_without_numbers() -> None:
     assert ends("L C+370 FMAX\nL C+380 M94 C FMAX", "XYZC")[-1] == [0, 0, 0, 380]
     assert fates("L X+1 Y+1 Z+1 M138 C FMAX\nL X+2\nM138\nL X+3 Y+1 Z+1 FMAX", "XYZBC")[1:] == [
-        (Rule.REFUSE, "M138: the control takes only some of the rotary axes into account"),
+        (Rule.REFUSE, "M138: the control includes only some of the rotary axes"),
         (Rule.CORRECT, ""),
     ]
     assert [rule for rule, _ in fates("L X+1 Y+1 Z+1 M138 B C FMAX", "XYZBC")] == [Rule.CORRECT]
@@ -61,7 +61,7 @@ def test_elements_of_free_contours_leave_the_tool_axis_where_it_is(element: str)
 )
 def test_a_rapid_from_where_the_control_has_led_the_tool_is_passed(before: str) -> None:
     found = fates(f"L X+1 Y+1 Z+5 F100\n{before}\nL Y+8 FMAX\nL X+1 Y+1 Z+1 FMAX")
-    assert found[-2] == (Rule.PASS, "a rapid from where the control itself has led the tool")
+    assert found[-2] == (Rule.PASS, "a rapid from a position that the control calculates")
     assert found[-1] == (Rule.CORRECT, "")
 
 
@@ -77,14 +77,14 @@ def test_that_a_tool_is_measured_is_said(number: int, said: bool) -> None:
 def test_a_pattern_of_a_code_is_no_block_that_does_nothing() -> None:
     hole = "CYCL DEF 200 ~\n Q200=2 ~\n Q201=-5 ~\n Q203=+0 ~\n Q204=50"
     found = fates(f"L X+1 Y+1 Z+5 FMAX\n{hole}\nCYCL DEF 224 ~\n Q216=+50\nL X+1 Y+1 Z+1 FMAX")
-    assert found[1] == (Rule.REFUSE, "cycle 224 moves the axes by itself where it is defined")
+    assert found[1] == (Rule.REFUSE, "cycle 224 moves the axes at its definition")
 
 
 def test_probing_cycles_that_set_a_datum() -> None:
     start = "L X+1 Y+1 Z+5 F100\n"
     (rule, reason) = fates(start + "TCH PROBE 413 DATUM OUTSIDE CIRCLE ~\n Q321=+5\nL X+1 Y+1 Z+1 FMAX")[-1]
     assert rule == Rule.REFUSE
-    assert "TCH PROBE 413 makes what it measures the datum" in reason
+    assert "TCH PROBE 413 sets the datum" in reason
     assert fates(start + "TCH PROBE 510\nL X+1 Y+1 Z+1 FMAX")[-1][0] == Rule.REFUSE
     assert fates(start + "TCH PROBE 421 MEASURE HOLE ~\n Q321=+5\nL X+1 Y+1 Z+1 FMAX")[-1] == (Rule.CORRECT, "")
     again = "TCH PROBE 413 DATUM ~\n Q321=+5\nCYCL DEF 247 PRESET Q339=+1\nL X+1 Y+1 Z+1 FMAX"
@@ -109,12 +109,12 @@ def test_trans_functions_do_what_the_cycles_do(function: str, cycle: str) -> Non
 
 def test_trans_functions_and_cycles_of_a_kind_are_not_mixed() -> None:
     body = "CYCL DEF 10.0 R\nCYCL DEF 10.1 ROT-30\nTRANS ROTATION RESET\nL X+10 Y+20 Z+5"
-    assert "how they add up is not sure" in fates(body)[-1][1]
+    assert "how the control combines them is not certain" in fates(body)[-1][1]
 
 
 def test_a_table_of_datums_by_trans() -> None:
     found = fates("L X+0 Y+0 Z+9 FMAX\nTRANS DATUM TABLE TABLINE7\nL X+1 FMAX\nTRANS DATUM RESET\nL X+1 FMAX")
-    assert "comes from a table" in found[1][1]
+    assert "is from a datum table" in found[1][1]
     assert found[2][0] == Rule.CORRECT
 
 
@@ -144,7 +144,10 @@ def test_a_program_that_was_selected_is_called() -> None:
     found = ends('L X+1 Y+1 Z+1 FMAX\nSEL PGM "TNC:\\S.H"\nCALL SELECTED PGM\nL Y+9 FMAX', files={"S.H": SUB})
     assert found == [[1, 1, 1], [5, 1, 1], [5, 9, 1]]
     for choice in ("SEL PGM QS1\n", ""):
-        assert "chosen at run time" in fates(f"L X+1 Y+1 Z+1 FMAX\n{choice}CALL SELECTED PGM\nL Y+9 FMAX")[-1][1]
+        assert (
+            "which program is called is known only at run time"
+            in fates(f"L X+1 Y+1 Z+1 FMAX\n{choice}CALL SELECTED PGM\nL Y+9 FMAX")[-1][1]
+        )
 
 
 def test_the_choice_of_a_table_changes_nothing_yet() -> None:
@@ -195,7 +198,7 @@ def test_bore_milling_comes_back_to_its_place_and_is_said_to_be_moved_as_a_whole
 def test_where_the_tool_stands_after_a_pocket_is_not_known_in_any_frame(frame: str) -> None:
     found = fates(f"L X+1 Y+1 Z+90 FMAX\n{frame}\n{POCKET}\nL X+50 Y+40 FMAX M99\nL X+60 FMAX M99")
     assert [rule for rule, _ in found[1:]] == [Rule.CORRECT, Rule.REFUSE]
-    assert "after a cycle with a path of its own is not followed" in found[2][1]
+    assert "after a cycle with a path of its own is not known" in found[2][1]
 
 
 def test_a_pocket_is_written_as_a_hole_is() -> None:
@@ -215,7 +218,7 @@ def test_a_cycle_begins_with_a_rapid_so_it_does_not_matter_where_from(call: str)
 def test_the_depth_of_an_old_cycle_counts_from_a_height_that_has_to_be_known() -> None:
     drilling = "CYCL DEF 1.0 PECKING\nCYCL DEF 1.1 SET UP 2\nCYCL DEF 1.2 DEPTH -8"
     found = fates(f"L X+1 Y+1 Z+90 FMAX\n{drilling}\nTCH PROBE 0.0 PLANE Q5 X-\nL X+50 Y+40 FMAX M99")
-    assert found[-1] == (Rule.REFUSE, "where the axis Z stands after a probing cycle is known only at run time")
+    assert found[-1] == (Rule.REFUSE, "the position of the axis Z after a probing cycle is known only at run time")
 
 
 def test_statements_that_move_nothing() -> None:
@@ -229,7 +232,7 @@ def test_statements_that_move_nothing() -> None:
     "line", ["WHILE Q1 < 5", "FOR Q1 = 1 TO 5", "IF Q1 < 5", "ELSE", "END WHILE", "BREAK", "CALL BLOCK"]
 )
 def test_lines_that_may_lead_elsewhere_and_are_not_followed_stop(line: str) -> None:
-    with pytest.raises(SourceError, match="NCF236: where the program goes on"):
+    with pytest.raises(SourceError, match="NCF236: an unknown line decides"):
         follow(f"L X+1 Y+1 Z+1 FMAX\n{line}\nL X+2")
 
 

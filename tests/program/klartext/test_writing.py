@@ -79,14 +79,14 @@ def test_after_an_arc_without_a_pole_the_one_in_force_comes_back() -> None:
 
 def test_a_refused_block_that_would_lead_elsewhere_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ncfix_heidenhain.klartext.writing.pole_in_force", lambda source, at: "X+50 Y+50")
-    with pytest.raises(SelfCheckError, match="would lead to"):
+    with pytest.raises(SelfCheckError, match="would end at"):
         fixed(AFTER_CR)
 
 
 def test_an_arc_is_refused_where_nobody_knows_which_pole_comes_back() -> None:
     report = fixed(AFTER_CR.replace("CC X+110,0 Y+10\n", "CC X+110,0 Y+10\nLBL 2\n")).report
     reasons = {each.line: each.reason for each in report.refused}
-    assert "which one was in force" in reasons[5]
+    assert "which pole was in force" in reasons[5]
     assert "(line 5)" in reasons[2], "the arc begins at its end"
 
 

@@ -75,11 +75,11 @@ def test_an_argument_that_nobody_knows_stays_and_so_does_the_depth() -> None:
 @pytest.mark.parametrize(
     ("body", "why"),
     [
-        (f"{MODAL}\nMARK: X5\nREPEATB MARK\nMCALL", "REPEAT would leave out"),
-        (f"{MODAL}\nSUPA G0 X5\nMCALL", "neither G0 nor G1 leads"),
-        (f"{MODAL}\nG2 X5 Y6 CR=5\nMCALL", "neither G0 nor G1 leads"),
+        (f"{MODAL}\nMARK: X5\nREPEATB MARK\nMCALL", "REPEAT would not execute it"),
+        (f"{MODAL}\nSUPA G0 X5\nMCALL", "without G0 or G1 in force"),
+        (f"{MODAL}\nG2 X5 Y6 CR=5\nMCALL", "without G0 or G1 in force"),
         ("MCALL CYCLE81(50,0,2,R9)\nX5\nMCALL", "known only at run time"),
-        ("CYCLE81(50,0,2,-20,21)", "given twice"),
+        ("CYCLE81(50,0,2,-20,21)", "gives its depth twice"),
         ("CYCLE81(50,0,2,8,,0,1)", "a diameter"),
         ("CYCLE82(50,0,2,-8,,0,0,12,10)", "another plane"),
         ("MCALL CYCLE83(50,0,2,-8,,-3,,2,0,0,1,0,,1,1,0,0,0,3,0)\nX5\nMCALL", "another plane"),

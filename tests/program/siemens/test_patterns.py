@@ -105,7 +105,7 @@ def test_in_another_plane() -> None:
 def test_patterns_that_are_refused(head: str, body: str, machine: Machine) -> None:
     program = read(f"{head}{body}\n{TAIL}".encode(), "part.mpf", "siemens")
     fixed = fix_flat(program, machine, SETUP, FixOptions(figures=False, flatten=True))
-    assert any("places the control makes up" in refusal.reason for refusal in fixed.report.refused)
+    assert any("positions the control calculates" in refusal.reason for refusal in fixed.report.refused)
 
 
 def test_as_it_stands_it_is_refused_and_what_follows_must_name_its_axes(machine: Machine) -> None:

@@ -51,7 +51,7 @@ def test_setting_data_that_lengths_and_errors_depend_on(setting: str) -> None:
 
 
 def test_an_axis_has_no_index() -> None:
-    assert reasons(follow("G0 X1\nX[1]=5\nX2")) == ["", "X[..] is not followed"]
+    assert reasons(follow("G0 X1\nX[1]=5\nX2")) == ["", "X[..] is not supported"]
 
 
 def test_only_rotary_axes_have_a_sense() -> None:

@@ -29,12 +29,14 @@ ENDS = frozenset({20, 170})
 CONTOURS = {0: "{0}", 1: "E_LAB_A_{0}:E_LAB_E_{0}", 2: "{1}:{2}"}
 """Second argument of CYCLE62 -> form of the contour: a subprogram, a contour of the editor, two labels."""
 
-NO_CONTOUR = "the contour of {} is not found: it has to be a subprogram, or to stand between two labels"
-NOT_REWRITTEN = "{} or its contour is in the file of a subprogram, which is not rewritten"
+NO_CONTOUR = "the contour of {} is not found: it must be a subprogram, or between two labels"
+NOT_REWRITTEN = "{} or its contour is in the file of a subprogram, which ncfix does not rewrite"
 OTHER_BLOCK = "the contour of {} has a block that is more than a line or an arc in the plane in force"
-NO_START = "the contour of {} does not begin with G0 or G1 to a place of which both words are known numbers"
-NOT_ALONE = "{} has to be called in a block by itself, in G90 and G40, and not under MCALL"
-ALONG = "{} is corrected at each point of its contour, at its bottom; its depth is corrected where the contour begins"
+NO_START = "the contour of {} does not begin with G0 or G1 to a position with both words as plain numbers"
+NOT_ALONE = "{} must be called in a block by itself, in G90 and G40, and not under MCALL"
+ALONG = (
+    "{} is corrected at each point of its contour, for its bottom; its depth is corrected at the start of the contour"
+)
 
 
 def mill_along(

@@ -47,8 +47,8 @@ Points = tuple[tuple[float, float], ...]
 ARGUMENTS = 6
 """Smallest number of arguments of a pattern."""
 MAX_HOLES = 1000
-WRITE_OUT = "holes whose places the control makes up ({}): --flatten writes them out"
-AFTER_PATTERN = "where the axis {} stands after a pattern of holes is not followed"
+WRITE_OUT = "holes whose positions the control calculates ({}): with --flatten ncfix writes them out"
+AFTER_PATTERN = "the position of the axis {} after a pattern of holes is not known"
 
 
 def row(values: Sequence[float | None]) -> Points:
@@ -136,18 +136,21 @@ def lead_to(
 POCKETS = frozenset({"cycle63", "cycle64"})
 """Cycles that use the contours named by CYCLE62."""
 
-MADE = "motions that the control makes up ({})"
-MADE_HOLES = "holes whose places the control makes up ({})"
-HEIGHTS = "the heights of the cycle {} are known only at run time"
-BY_DIAMETER = "the depth of {} follows from a diameter (_GMODE)"
-TO_A_HOLE = "a hole under MCALL to which neither G0 nor G1 leads, or one in machine coordinates"
+MADE = "motions that the control generates ({})"
+MADE_HOLES = "holes whose positions the control calculates ({})"
+HEIGHTS = "the planes and the depth of the cycle {} are known only at run time"
+BY_DIAMETER = "a diameter gives the depth of {} (_GMODE)"
+TO_A_HOLE = "a hole under MCALL without G0 or G1 in force, or in machine coordinates"
 WITH_WORDS = "a drilling cycle and axis words in one block"
-ELSEWHERE = "this hole needs a depth of its own, and its cycle is called in another file"
-ALONE = "this hole needs a line of its own, which REPEAT would leave out"
-UNDER_ANOTHER = "this hole needs a line of its own, after which the modal cycle in force would drill"
-UNSTATED = "this hole needs a line of its own, and the motion code in force is not known"
-MEASURES = "{} measures, and may set a work offset at run time, until the program calls one anew (G54, ...)"
-AFTER_CYCLE = "where the axis {} stands after a cycle is not followed"
+ELSEWHERE = "this hole needs a depth of its own, but its cycle is called in another file"
+ALONE = "this hole needs a line of its own, but REPEAT would not execute it"
+UNDER_ANOTHER = "this hole needs a line of its own, but the modal cycle in force would drill after that line"
+UNSTATED = "this hole needs a line of its own, but the motion code in force is not known"
+MEASURES = (
+    "{} measures and may set a work offset at run time; motions are refused until the program selects a work offset "
+    "(G54, ...)"
+)
+AFTER_CYCLE = "the position of the axis {} after a cycle is not known"
 
 CENTRING, GEOMETRY_MODE = "cycle81", 6
 """The cycle whose depth may be given by a diameter, and the index of the argument that tells (_GMODE)."""

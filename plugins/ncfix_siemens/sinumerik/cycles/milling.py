@@ -75,17 +75,17 @@ CHAMFER = 5
 PLANES = {1: Z, 2: Y, 3: X}
 """Last digit of DMODE -> axis across the plane that it selects."""
 
-AT_RUN_TIME = "where and how deep {} works is known only at run time"
-NO_PLACE = "{} does not say where it works (PA, PO)"
-OWN_PLACE = "{} is called by MCALL, and names a place of its own (PA, PO)"
-NO_DEPTH = "how deep {} goes is not clear: RTP, RFP and its bottom have to lie below each other"
-NO_WAY_DOWN = "how deep {} goes is not clear: its mode (AMODE) asks for a way down, a positive number"
-TWO_DEPTHS = "the depth of the cycle {} is given twice, DP and DPR, and they are not the same"
-OF_CHAMFER = "{} mills a chamfer, and its mode (AMODE) does not say that the depth (ZFS) is a way down"
-OWN_CONTOUR = "{} is called by MCALL, and its contour says where it works"
-OTHER_COUNT = "{} is called with a number of arguments of which it is not known what they mean"
-OTHER_PLANE = "{} chooses another plane (DMODE) than the one in force"
-IN_DIAMETERS = "{} is called while X counts as a diameter"
+AT_RUN_TIME = "the position and depth of {} are known only at run time"
+NO_PLACE = "{} does not give its position (PA, PO)"
+OWN_PLACE = "{} is called by MCALL, but gives its own position (PA, PO)"
+NO_DEPTH = "the depth of {} is not clear: RTP, RFP and the bottom must be one below the other"
+NO_WAY_DOWN = "the depth of {} is not clear: with its mode (AMODE) the depth is a distance, which must be positive"
+TWO_DEPTHS = "the cycle {} gives its depth twice (DP and DPR), with different values"
+OF_CHAMFER = "{} mills a chamfer, but its mode (AMODE) does not make the depth (ZFS) a distance"
+OWN_CONTOUR = "{} is called by MCALL, but its contour gives its position"
+OTHER_COUNT = "ncfix does not know {} with this number of arguments"
+OTHER_PLANE = "{} selects another plane (DMODE) than the one in force"
+IN_DIAMETERS = "{} is called while X is a diameter"
 
 ALIKE = 1e-6
 """Largest difference of equal depths, in program units."""

@@ -367,7 +367,7 @@ class RunningComparison:
             match.along.limit = self.limit
         meant, made = self.intended.cut, self.fixed.cut
         if (self.intended.count == 0) != (self.fixed.count == 0) or abs(meant - made) > UNLIKE * max(meant, made):
-            text = f"the two programs do not cut the same: {meant:.3f} mm and {made:.3f} mm of path"
+            text = f"the two programs do not have the same path: {meant:.3f} mm and {made:.3f} mm"
             raise DifferenceError.of("NCF420", text, hint="give the original program first, then the corrected one")
 
     def _take_original(self, cut: CutPath | None) -> None:

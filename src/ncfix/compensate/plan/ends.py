@@ -311,9 +311,11 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
         Finding.of(
             "NCF402",
             rows[named & np.isfinite(lengths) & ~fit],
-            "the linear axes cannot bring the tool tip there with the rotary axes where they are",
+            "with the rotary axes at these angles the linear axes cannot move the tool tip there",
         ),
-        Finding.of("NCF403", good[~result.converged], "no command found that brings the tool tip where it should be"),
+        Finding.of(
+            "NCF403", good[~result.converged], "no command was found that moves the tool tip to its intended position"
+        ),
     )
     return Ends(wanted, failed, oriented, tuple(trouble for trouble in troubles if len(trouble)), before)
 

@@ -120,9 +120,7 @@ class Found:
         axes, more = sorted(self.axes), self.count - 1
         words = {
             "cuts": f"this cut and {more} more begin" if more else "this cut begins",
-            "play": "their play" if axes[1:] else "its play",
             "axis": " and ".join(filter(None, (", ".join(axes[:-1]), axes[-1]))),
-            "is_": "are" if axes[1:] else "is",
         }
         return replace(self.shown[0], text=self.shown[0].text.format(value=self.most, **words))
 
@@ -170,5 +168,5 @@ class Notes:
                 continue
             messages += note.shown
             if note.count > MOST:
-                messages.append(Message(code, f"and {note.count - MOST} more motions like these"))
+                messages.append(Message(code, f"and {note.count - MOST} more motions of this kind"))
         return tuple(dict.fromkeys(messages))

@@ -60,7 +60,8 @@ def linear_columns(machine: Machine) -> Index:
     if len(columns) != len(SPATIAL):
         raise RefusedError.of(
             "NCF401",
-            f"machine {machine.name!r} has no three linear axes X, Y and Z, so its tool tip cannot be corrected",
+            f"machine {machine.name!r} does not have the three linear axes X, Y and Z, so its tool tip cannot be "
+            "corrected",
             hint=f"its axes are {', '.join(names)}",
         )
     return np.array(columns, dtype=np.intp)
@@ -113,8 +114,8 @@ def joints_from_commands(machine: Machine, commands: Array, tcp: Mask, tool_leng
     """
     q, reached = reached_joints(machine, commands, tcp, tool_length)
     if not reached.all():
-        text = "the linear axes cannot bring the tool tip to the commanded point with the rotary axes where they are"
-        raise pose_error("NCF402", text, ~reached, "two linear axes are parallel in the workpiece there")
+        text = "with the rotary axes at these angles the linear axes cannot move the tool tip to the commanded point"
+        raise pose_error("NCF402", text, ~reached, "two linear axes are parallel in the workpiece at this pose")
     return q
 
 

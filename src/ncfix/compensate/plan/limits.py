@@ -65,8 +65,8 @@ def beyond_ranges(written: WrittenPieces) -> tuple[Finding, Finding]:
         either = np.fmax(programmed, np.where(corrected > FUZZ, begun, -np.inf))
         corrected[either > FUZZ] = -np.inf
         programmed = np.where(some(programmed > FUZZ)[:, None], programmed, either)
-    outside = "axis {axis} goes {value:.4g} {unit} beyond the range over which its errors are known, {range}"
-    over = "the correction takes axis {axis} {value:.4g} {unit} beyond its range, {range}"
+    outside = "axis {axis} moves {value:.4g} {unit} beyond the range in which its errors are known, {range}"
+    over = "the correction moves axis {axis} {value:.4g} {unit} beyond its range, {range}"
     return _of_axes(written, "NCF405", outside, programmed), _of_axes(written, "NCF404", over, corrected)
 
 

@@ -128,8 +128,11 @@ def _shares(pieces: Pieces, real: Segments, counts: Index) -> Array:
     return share / np.repeat(sums(share, counts), counts)
 
 
-SIDE = "{cuts} where nobody knows on which side of {play} {axis} {is_}: the tip may be up to {value:.1f} um off there"
-SIDE_HINT = "before the first cut, move such axes farther than their play; --initial says where they come from"
+SIDE = "{cuts} while the side of the backlash of {axis} is not known: the tip may be up to {value:.1f} um off there"
+SIDE_HINT = (
+    "before the first cut move these axes farther than their backlash, or give their positions at the start with "
+    "--initial"
+)
 
 SAMPLED = 0.02
 """Share of the tolerance that is kept for errors between samples. There are at least `DENSITY` samples in the shortest
@@ -219,7 +222,7 @@ def _plan(intent: Intent, strategy: Strategy, required: Requirements, unchanged:
         planned = _plan(intent, strategy, required, also, before)
         return replace(planned, findings=(*ends.findings, finding, *planned.findings))
 
-    text = "this arc would have to be made of straight pieces, and must not be split"
+    text = "this arc needs to become straight pieces, but must not be split"
     if stuck := Finding.of("NCF415", np.flatnonzero(broken & bound), text):
         return without(stuck)
     beside = beside_contours(intent, real) if strategy.follows_path else None
@@ -232,8 +235,8 @@ def _plan(intent: Intent, strategy: Strategy, required: Requirements, unchanged:
     over = over[~too_long(intent, over)]
     parts = in_pieces(intent, real, over, deviation[over], strategy, required)
     deviation[over] = parts.worst
-    unseen, hint = _not_far_off(intent, np.flatnonzero(np.isinf(deviation))), "make several motions of it"
-    text = "this motion is so long, or makes so many turns, that it cannot be looked at closely enough"
+    unseen, hint = _not_far_off(intent, np.flatnonzero(np.isinf(deviation))), "divide it into several motions"
+    text = "this motion is too long, or has too many turns, to be checked along its path"
     if too_far := Finding.of("NCF417", unseen, text, hint):
         return without(too_far)
     findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, unchanged, strategy, required))
@@ -252,7 +255,10 @@ def _worse_contours(intent: Intent, beside: OffsetPoints | None, unchanged: Mask
     That is, beyond the tolerance, and by more than before plus the effect of rounding. All corrected motions of such a
     contour are in the finding.
     """
-    text = "beside this contour the control would take the tool up to {value:.1f} um off, farther than uncorrected"
+    text = (
+        "at a corner of this contour the offset tool would be up to {value:.1f} um off, farther than without the "
+        "correction"
+    )
     none = Finding.of("NCF454", np.zeros(0, dtype=np.intp), text)
     if beside is None:
         return none
@@ -363,7 +369,7 @@ def _not_far_off(intent: Intent, rows: Index) -> Index:
 
 def not_split(rows: Index, deviation: Array) -> Finding:
     """NCF413: motions (k,) that would have to be split but must not be; `deviation` (k,) mm."""
-    text = "the tool tip leaves the intended path by {value:.1f} um, and this motion must not be split"
+    text = "the tool tip is up to {value:.1f} um from the intended path, but this motion must not be split"
     return Finding("NCF413", rows, deviation * 1e3, text, kind=FindingKind.REMARK)
 
 
@@ -378,7 +384,10 @@ def _remarks(
         remarks.append(not_split(over, deviation[over]))
     unknown = _unknown_radius(intent, unchanged)
     if unknown.size:
-        text = "the radius of the tool is not known: what the control makes of corners beside it is not in the figures"
+        text = (
+            "the radius of the tool is not known: the figures do not include what the control does at corners of the "
+            "contour"
+        )
         hint = "give it as --tool NUMBER=LENGTH,RADIUS"
         remarks.append(Finding.of("NCF455", unknown, text, hint, FindingKind.REMARK))
     done = np.flatnonzero(~unchanged)
@@ -386,13 +395,13 @@ def _remarks(
         remarks.append(unsure)
     if not budget.fine and done.size:
         text = (
-            "rounding to the control's digits alone moves the tool tip by up to {value:.2f} um, on top of the tolerance"
+            "rounding to the control's digits moves the tool tip by up to {value:.2f} um, in addition to the tolerance"
         )
         figure = np.array([budget.rounding * 1e3])
         remarks.append(Finding("NCF409", done[:1], figure, text, kind=FindingKind.ONCE))
     held = done[~oriented[done]]
     if strategy.corrects_orientation and held.size:
-        text = "the tool direction is not, or not fully, corrected here"
+        text = "the tool direction is not fully corrected here"
         remarks.append(Finding.of("NCF410", held, text, kind=FindingKind.REMARK))
     return remarks
 

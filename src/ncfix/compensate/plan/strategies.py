@@ -115,8 +115,8 @@ class Strategy(ABC):
         """
         correction = self.solve(machine, q, state)
         if not correction.converged.all():
-            text = f"no command found that brings the tool tip where it should be (strategy {self.name})"
-            raise pose_error("NCF403", text, ~correction.converged, "the error model may have a jump there")
+            text = f"no command was found that moves the tool tip to its intended position (strategy {self.name})"
+            raise pose_error("NCF403", text, ~correction.converged, "check the error model for a jump at this position")
         return correction.q
 
 
@@ -124,7 +124,7 @@ class PositionStrategy(Strategy):
     """Brings the tool tip to its exact place by Newton's method on the whole model; rotary axes keep their values."""
 
     name = "position"
-    leaves = "The orientation of the tool is left as the machine makes it; rotary axes keep their values."
+    leaves = "The tool direction is not corrected; rotary axes keep their values."
 
     def solve(self, machine: Machine, q: Array, state: State, path: PoseSequence | None = None) -> Correction:
         """See `Strategy.solve`."""
@@ -191,8 +191,9 @@ class Full(Strategy):
 
     name = "full"
     leaves = (
-        "The turn of the tool about its own axis is not corrected. Near poses in which a rotary axis turns the tool "
-        "about itself, and where corrections would be too large or too fast, its direction is not, or only partly."
+        "The rotation of the tool about its own axis is not corrected. The tool direction is not or only partly "
+        "corrected near poses in which a rotary axis turns the tool about its own axis, and where corrections would "
+        "be too large or too fast."
     )
     corrects_orientation = True
 
@@ -330,8 +331,9 @@ class Thesis(Strategy):
 
     name = "thesis"
     leaves = (
-        "Made to reproduce printed numbers, not to cut by: angles of linear axes, orientation, errors between points "
-        "and whatever rounding to whole millimetres and degrees misses are left."
+        "This strategy reproduces printed numbers and is not for machining. It does not correct angular errors of "
+        "linear axes, the tool direction, errors between points, and the part of the error that rounding to whole "
+        "millimetres and degrees misses."
     )
     follows_path = False
 
@@ -341,7 +343,7 @@ class Thesis(Strategy):
             raise UsageError.of(
                 "NCF412",
                 "the thesis' procedure is for linear axes on the tool side and rotary axes under the workpiece",
-                hint="`--strategy rotary-then-linear` is the same idea for any machine",
+                hint="use `--strategy rotary-then-linear`, the same principle for any machine",
             )
         still = np.where(machine.rotary, 0.0, q)
         point = machine.tip(still, state.tool_length) + np.asarray(machine.workpiece_offset)

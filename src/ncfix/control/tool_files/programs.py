@@ -70,7 +70,7 @@ def tool_data_rows(text: str, scale: float) -> Iterator[Row]:
                 edges.setdefault((int(tool), int(edge)), {})[int(number)] = float(value)
                 lines.setdefault(int(tool), line)
             elif (more := BESIDES.get(what.upper())) and re.fullmatch(NUMBER, value) and float(value):
-                yield line, f"{more} ($TC_{what.upper()}) are not followed"
+                yield line, f"{more} ($TC_{what.upper()}) are not supported"
     if len(units) > 1:
         yield 0, f"tools of several units: CHANDATA {', '.join(sorted(units))}; give those of one"
     taken = list(names.values())
@@ -127,9 +127,9 @@ def offset_rows(text: str, scale: float) -> Iterator[Row]:
         if kind not in (GEOMETRY, WEAR, OLD, *ACROSS) or not words["P"].isdecimal():
             yield line, "is not understood: tool offsets are written as G10 L10 P1 R120.5, with L10 to L13"
         elif words.get("G") == "91":
-            yield line, "G91: adds to a value that is not here"
+            yield line, "G91: adds to a value that the file does not give"
         elif "." not in words["R"] and float(words["R"]):
-            yield line, "a value without a decimal point: nobody says in which increments it counts"
+            yield line, "a value without a decimal point: its increment is not given"
         elif kind not in ACROSS:
             key = int(words["P"]), WEAR if kind == OLD else int(kind)
             if key in found:
@@ -144,4 +144,4 @@ def offset_rows(text: str, scale: float) -> Iterator[Row]:
         if not apart or (number, GEOMETRY) in found:
             yield parts[0][0], (number, Tool(sum(value for _, value in parts) * scale))
         elif parts[0][1]:
-            yield parts[0][0], f"offset {number} has a wear (L11) and no length (L10)"
+            yield parts[0][0], f"offset {number} has a wear (L11) but no length (L10)"

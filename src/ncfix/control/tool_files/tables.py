@@ -66,11 +66,11 @@ def load_tool_table(path: str, axes: Collection[str] = OTHER_AXES, unit: str = "
         elif max(abs(content[1].length or 0.0), abs(content[1].radius or 0.0)) > MAX_LENGTH_MM:
             faults.append(Message(BAD_TABLE, f"no tool is longer than {MAX_LENGTH_MM:g} mm", Place(path, line)))
         elif content[0] in tools:
-            faults.append(Message(BAD_TABLE, f"tool {content[0]} stands twice", Place(path, line)))
+            faults.append(Message(BAD_TABLE, f"tool {content[0]} appears twice", Place(path, line)))
         else:
             tools[content[0]] = content[1]
     if not tools and not faults:
-        faults.append(Message(BAD_TABLE, "there is no tool in it", Place(path), OTHERWISE))
+        faults.append(Message(BAD_TABLE, "there is no tool in the table", Place(path), OTHERWISE))
     if faults:
         raise ConfigError.collected(faults)
     return tools
@@ -109,10 +109,10 @@ def linuxcnc_rows(text: str, axes: Collection[str], scale: float) -> Iterator[Ro
         values = {letter: float(number) for letter, number in words}
         aside = [f"{letter}{values[letter]:g}" for letter in OTHER_AXES if letter in axes and values.get(letter)]
         if rest:
-            yield line, f"{rest!r} is not understood in a tool table"
+            yield line, f"{rest!r} does not belong in a tool table"
         elif len(values) < len(words):
             twice = next(letter for letter in values if [each for each, _ in words].count(letter) > 1)
-            yield line, f"{twice} stands twice"
+            yield line, f"{twice} appears twice in the line"
         elif "T" not in values or not values["T"].is_integer():
             yield line, "the line names no tool (T)"
         else:
@@ -133,7 +133,7 @@ def csv_rows(text: str, scale: float) -> Iterator[Row]:
         yield first, f"the columns are {', '.join(COLUMNS)}; found {', '.join(names)}"
         return
     if len(set(names)) < len(names):
-        yield first, f"a column stands twice: {', '.join(names)}"
+        yield first, f"a column appears twice: {', '.join(names)}"
         return
     for line, row in rows:
         yield line, csv_tool(names, separated.cells(row, line), separated, scale)
@@ -158,7 +158,7 @@ def csv_tool(names: list[str], row: list[Cell], separated: SeparatedText, scale:
         return f"{values['tool']:g} is not a tool number"
     radius = values.get("radius", values.get("diameter", math.nan) / 2)
     if "diameter" in values and not math.isclose(radius, values["diameter"] / 2, abs_tol=1e-6):
-        return f"radius {radius:g} and diameter {values['diameter']:g} are of two tools"
+        return f"radius {radius:g} and diameter {values['diameter']:g} contradict each other"
     return int(values["tool"]), Tool(values["length"] * scale, None if math.isnan(radius) else radius * scale)
 
 
@@ -175,10 +175,10 @@ def tool_t_rows(text: str) -> Iterator[Row]:
     at = _past_description(lines)
     names = [(name[0].upper(), name.start()) for name in re.finditer(r"\S+", "".join(lines[at : at + 1]))]
     if head is None or not {"T", "L"} <= {name for name, _ in names}:
-        yield at + 1, "this line names no columns T and L"
+        yield at + 1, "this line has no columns T and L"
         return
     if head["unit"] is None:
-        yield 1, "the first line does not say MM or INCH"
+        yield 1, "the first line does not name the unit, MM or INCH"
         return
     scale = INCH if head["unit"].upper() == "INCH" else 1.0
     stops = [start for _, start in names[1:]] + [None]
@@ -188,7 +188,7 @@ def tool_t_rows(text: str) -> Iterator[Row]:
         if TOOL_T_END.match(line):
             return
         if "\t" in line or any(re.match(r"\S\S", line[edge - 1 : edge + 1]) for edge in edges):
-            yield number, "words are not below the names of their columns"
+            yield number, "values are not below the names of their columns"
             continue
         if number == at + 1:
             continue
