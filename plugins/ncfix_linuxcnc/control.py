@@ -58,6 +58,8 @@ DECIMALS = {"mm": 6, "inch": 7}
 """Decimals in a file of that unit: one nanometre, and less than three."""
 LOADS = re.compile(rb"(?im)^[ \t]*COMP_FILE[ \t]*=")
 Entries = dict[str, tuple[int, str]]
+ONCE = ("COMP_FILE", "COMP_FILE_TYPE", "COORDINATES", "LINEAR_UNITS", "ANGULAR_UNITS")
+"""Entries of which LinuxCNC takes the first."""
 
 
 @frozen
@@ -74,6 +76,11 @@ class JointTable:
     def file(self) -> str:
         """The name of its file."""
         return f"joint_{self.number}_{self.axis}.comp"
+
+    def does_as(self, other: JointTable) -> bool:
+        """Whether another table holds the same numbers."""
+        columns = ((each.nodes, each.forward, each.reverse) for each in (self, other))
+        return all(np.array_equal(*pair) for pair in zip(*columns, strict=True))
 
     def terms(self) -> tuple[Term, Term]:
         """The forward and reverse columns as terms, mm or rad."""
@@ -119,6 +126,9 @@ def read_joints(files: Files) -> tuple[list[JointTable], list[Remarks]]:
         if name.startswith("JOINT_") and "COMP_FILE" in entries:
             found = _joint(name, entries, letters, scale, files, ini, remarks)
             joints += [found] if found else []
+        elif "COMP_FILE" in entries:
+            text = f"COMP_FILE under [{name}]: LinuxCNC reads it under [JOINT_n] (2.7 and older under [AXIS_n])"
+            ini.refuse(entries["COMP_FILE"][0], text, "the section of the joint")
     return joints, remarks
 
 
@@ -163,7 +173,10 @@ def _sections(ini: Remarks) -> dict[str, Entries]:
         if section := SECTION.fullmatch(row):
             entries = found.setdefault(section[1].upper(), {})
         elif entry := ENTRY.fullmatch(row):
-            entries[entry[1].upper()] = (number, entry[2])
+            key = entry[1].upper()
+            if key in ONCE and key in entries:
+                ini.refuse(number, f"{key} is there twice: LinuxCNC takes the first", "one line for each")
+            entries[key] = (number, entry[2])
         elif row.strip() and not row.lstrip().startswith(("#", ";")):
             ini.refuse(number, "neither a section, nor NAME = VALUE, nor a comment")
     return found
@@ -304,7 +317,7 @@ class LinuxCnc(Control):
     )
     options: ClassVar[Mapping[str, Option]] = {
         "type": Option("1", "COMP_FILE_TYPE: 1 corrections, 0 actual positions", one_of("0", "1")),
-        "coordinates": Option("", "axis letters in the order of the joints, e.g. XYZBC"),
+        "coordinates": Option("", "axis letters in the order of the joints, e.g. XYZBC, or XYYZ for a gantry"),
         "points": Option(str(MAX_POINTS), "most points of one file, at most 256", whole(2, MAX_POINTS)),
         "unit": Option("mm", "LINEAR_UNITS of the machine: mm or inch", one_of("mm", "inch")),
     }
@@ -334,13 +347,17 @@ class LinuxCnc(Control):
     def read(self, files: Files) -> Compensation:
         """The tables as LinuxCNC loads them. Raises `ConfigError` NCF491."""
         joints, remarks = read_joints(files)
-        axes = [joint.axis for joint in joints]
-        for axis in {axis for axis in axes if axes.count(axis) > 1}:
-            numbers = " and ".join(str(joint.number) for joint in joints if joint.axis == axis)
-            hint = "leave one of the two COMP_FILE lines to look at one side alone"
-            remarks[0].refuse(0, f"joints {numbers} move {axis} together: two tables for one axis are not run", hint)
+        moving: dict[str, list[JointTable]] = {}
+        for joint in joints:
+            moving.setdefault(joint.axis, []).append(joint)
+        for axis, together in moving.items():
+            if not all(together[0].does_as(other) for other in together[1:]):
+                numbers = " and ".join(str(joint.number) for joint in together)
+                text = f"joints {numbers} move {axis} together: two tables for one axis are not run"
+                hint = "leave one of the two COMP_FILE lines to look at one side alone"
+                remarks[0].refuse(0, text, hint)
         check_all(remarks)
-        return Compensation(tuple(term for joint in joints for term in joint.terms()))
+        return Compensation(tuple(term for together in moving.values() for term in together[0].terms()))
 
     def lint(self, files: Files) -> tuple[Message, ...]:
         """Remarks on what stops LinuxCNC's reader early, and on unusual values."""
@@ -364,14 +381,15 @@ def _joints(tables: Compensation, letters: str) -> list[JointTable]:
         unit = unit_of(axis)
         nodes = pair[0].nodes[0] / unit
         forward, reverse = (grid.values[:, 0] / unit for grid in pair)
-        found.append(JointTable(letters.index(axis), axis, nodes, forward, reverse))
+        numbers = (number for number, letter in enumerate(letters) if letter == axis)
+        found += [JointTable(number, axis, nodes, forward, reverse) for number in numbers]
     return sorted(found, key=lambda joint: joint.number)
 
 
 def _coordinates(request: Request, given: str) -> str:
     names = "".join(in_order(request.machine))
     letters = given.replace(" ", "").upper() or names
-    if sorted(letters) != sorted(names):
+    if {*letters} != {*names}:
         raise wrong_setting({"coordinates": given}, "coordinates", f"the axes of the machine: {' '.join(names)}")
     return letters
 

@@ -139,6 +139,8 @@ def assignments(lines: Iterable[FileRow], remarks: Remarks) -> Iterator[ArrayAss
             if line.text.strip() and not line.text.lstrip().startswith(";"):
                 remarks.refuse(line.line, "stands after the end of the file", "M17 goes last")
         elif isinstance(line, ArrayAssignment):
+            if line.lead.lstrip().startswith("/"):
+                remarks.doubt(line.line, "a line with /: the control leaves it out while block skip is on")
             yield from line.listed()
         elif ENDS.fullmatch(line.text):
             ended = True

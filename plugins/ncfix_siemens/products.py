@@ -152,10 +152,18 @@ def read_folder(files: Files) -> Folder:
 
 
 def _look_across(folder: Folder, remarks: Remarks) -> None:
-    """Note faults that only show in all tables together: double correction, too many tables, one-sided tables.
+    """Note faults that only show in all tables together: tables in two places, double correction, too many
+    tables, one-sided tables.
 
     If the control also adds the factors of products, a table of an axis over itself cancels that, and is no fault.
     """
+    numbers = [table.index + 1 for table in folder.cec]
+    for number in sorted({number for number in numbers if numbers.count(number) > 1}):
+        remarks.refuse(0, f"table {number} is in more than one file: the control keeps what is loaded last")
+    encoders = [table.output for table in folder.eec if table.values.any()]
+    for axis in sorted({axis for axis in encoders if encoders.count(axis) > 1}):
+        text = f"{axis} has more than one encoder table: the control takes that of the encoder in use"
+        remarks.refuse(0, text, "leave the one that is in use")
     own = {table.output for table in folder.eec}
     pointed = {table.multiply for table in folder.cec if table.multiply}
     offsets = bool(pointed) and folder.said.get("product_terms", "only") != "only"

@@ -168,12 +168,14 @@ def test_what_spreadsheets_of_other_countries_write(mark, decimal, coding):
     }
 
 
-def test_a_spreadsheet_s_quotes_and_mark_mean_nothing():
+@pytest.mark.parametrize("head", ["{}\r\n", '"{}"\r\n', '"{}",,,\r\n'])
+def test_a_spreadsheet_s_quotes_and_mark_mean_nothing(head: str):
     quoted = "".join(
-        line if line.startswith("#") else ",".join(f'"{cell}"' for cell in line.strip().split(",")) + "\r\n"
-        for line in GOOD.splitlines(keepends=True)
+        head.format(line) if line.startswith("#") else ",".join(f'"{cell}"' for cell in line.split(",")) + "\r\n"
+        for line in GOOD.splitlines()
     )
     plain, other = reads(GOOD.encode(), THREE), reads(quoted.encode("utf-8-sig"), THREE)
+    assert plain.headers == other.headers
     assert {key: list(column) for key, column in plain.columns.items()} == {
         key: list(column) for key, column in other.columns.items()
     }
@@ -379,6 +381,7 @@ AS_SAVED = RTL.replace("Targets:\n0.000 50.000 100.000\n", "Targets :\n0.000  50
         AS_SAVED.replace("ENVIRONMENT::", "\nEQUIPMENT::\nSerial: 1 2 3\nEOF::\n"),
         "\n" + AS_SAVED.replace(" 2 1.2", "\t2\t1.2"),
         AS_SAVED.replace("Data:\n1 1", "Data: 1 1"),
+        AS_SAVED.replace("Axis: X", "Axis: X\nUnits: mm, \u00b5m\nLaser unit: XL-80"),
     ],
 )
 def test_the_forms_of_an_interferometers_file(text: str):
@@ -402,6 +405,10 @@ def test_the_forms_of_an_interferometers_file(text: str):
         ("2 1 0.4", "2 1 0,4", "'0,4' is not a number"),
         ("Target-count: 3", "Target-count: 4", "is a part of the file missing?"),
         ("Targets:", "Target:", "no line `Targets:`"),
+        ("Axis: X", "Axis: X\nUnits: inches", "targets are read as mm"),
+        ("USER-TEXT::", "Target units: in\nUSER-TEXT::", "targets are read as mm"),
+        ("Axis: X", "Axis: X\nAxis: Y", "`Axis:` is there twice"),
+        ("ENVIRONMENT::", "DEVIATIONS::\nRun Target Data:\n1 1 0.1\n", "`Run Target Data:` is there twice"),
     ],
 )
 def test_interferometers_files_that_cannot_be_taken_for_positioning(old: str, new: str, said: str):
@@ -473,6 +480,8 @@ def test_deviations_in_millimetres_are_remarked():
         ("X EXX [um]\n0 0\n100 10\n", "'\\[um\\]' is not an error of X"),
         ("X Y EXX\n0 0 0\n", "a grid over several axes"),
         ("X;EXX\n0;0\n100;0,01\n", "3 cells, but 2 columns(.|\n)*decimal point"),
+        ("X;EXX;EYX\n0;0;0\n0,5;2\n", "3:(.|\n)*a decimal comma(.|\n)*decimal point"),
+        ("[EXX]\nGridpoints = {\n 0 0\n}\n[EXX]\nGridpoints = {\n 0 1\n}\n", "5:1(.|\n)*EXX(.|\n)*twice"),
         ("[EXX]\nGridpoints = {\n 0 0\n 50 5 1\n 100 10\n}\n", "4:1: NCF618: invalid line"),
         ("[EXX]\nUNIT = um\nGridpoints = {\n 0 0\n 100 10\n}\n", "2:1: NCF618: invalid line"),
         ("[C0B\nVALUE = 1e-5\n[EXX]\nGridpoints = {\n 0 0\n}\n", "1:1: NCF618: invalid line"),

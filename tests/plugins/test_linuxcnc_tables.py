@@ -98,10 +98,22 @@ def test_tables_of_rotary_axes_are_in_degrees() -> None:
 
 def test_two_joints_of_one_axis_are_not_added_up() -> None:
     """A gantry: each joint has its table, and the axis is not corrected twice."""
-    ini = INI.replace(b"X Y Z", b"X X Y Z") + b"[JOINT_1]\nCOMP_FILE = x.comp\nCOMP_FILE_TYPE = 1\n"
+    ini = INI.replace(b"X Y Z", b"X X Y Z") + b"[JOINT_1]\nCOMP_FILE = y.comp\nCOMP_FILE_TYPE = 1\n"
     with pytest.raises(ConfigError, match="joints 0 and 1 move X together"):
-        CONTROL.read({"comp.ini": ini, "x.comp": GOOD})
-    assert not CONTROL.lint({"comp.ini": ini, "x.comp": GOOD})
+        CONTROL.read({"comp.ini": ini, "x.comp": GOOD, "y.comp": GOOD.replace(b"0.002", b"0.003")})
+    same = {"comp.ini": ini.replace(b"y.comp", b"x.comp"), "x.comp": GOOD}
+    assert not CONTROL.lint(same)
+    assert at(same, 5, 1) == pytest.approx(-0.0005, abs=1e-9)
+
+
+def test_a_gantry_has_its_table_for_both_joints() -> None:
+    machine = single_error("EYY").replace(effects=(Effect("EYY", (1e-4,), Polynomial((1,))),))
+    space = ranges_of(machine)
+    plain = export(CONTROL, Request(machine, space, 0.0, 0.001), 100)
+    made = export(CONTROL, Request(machine, space, 0.0, 0.001, {"coordinates": "XYYZ"}), 100)
+    assert made.native["joint_1_Y.comp"] == made.native["joint_2_Y.comp"] == plain.native["joint_1_Y.comp"]
+    assert b"COORDINATES = X Y Y Z\n" in made.native["comp.ini"]
+    assert (made.left.after == plain.left.after).all()
 
 
 @pytest.mark.parametrize("head", ["# screw of X\n", "0,0 0,0 0,0\n", "; X\n\n", "nominal forward reverse\n"])
@@ -136,6 +148,9 @@ BROKEN_INI = {
     "no such file": (INI.replace(b"x.comp", b"y.comp"), "y.comp is missing"),
     "no such joint": (INI.replace(b"JOINT_0", b"JOINT_7"), "no axis of COORDINATES"),
     "no units": (INI.replace(b"LINEAR_UNITS = mm\n", b""), "LINEAR_UNITS"),
+    "two types": (INI + b"COMP_FILE_TYPE = 0\n", "COMP_FILE_TYPE is there twice: LinuxCNC takes the first"),
+    "a joint twice": (INI + b"[JOINT_0]\nCOMP_FILE = y.comp\n", "COMP_FILE is there twice"),
+    "the section of an axis": (INI.replace(b"JOINT_0", b"AXIS_X"), "reads it under [JOINT_n]"),
     "no assignment": (INI + b"COMP FILE x\n", "nor NAME = VALUE"),
 }
 

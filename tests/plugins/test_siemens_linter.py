@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -71,6 +73,7 @@ DOUBTFUL = {
     "check this value for a typing error": (GOOD.replace(b"0.003", b"0.9"), "changes by"),
     "both factors turned": (PAIR.replace(b"=0.2", b"=-0.2"), "the largest value of the multiplier"),
     "a chain of products": (PAIR.replace(b"TABLE[1]=0", b"TABLE[1]=1"), "is itself multiplied by another"),
+    "block skip": (GOOD.replace(b"$AN_CEC[0,1]", b"/N20 $AN_CEC[0,1]"), "while block skip is on"),
     "one way only": (GOOD.replace(b"DIRECTION[0]=0", b"DIRECTION[0]=1"), "only while it moves in one direction"),
     "two ends of lines": (GOOD.replace(b"STEP[0]=50.0\n", b"STEP[0]=50.0\r\n"), "end in two ways"),
     "EEC: ends that differ": (EEC.replace(b"MODULO[0,AX1]=0", b"MODULO[0,AX1]=TRUE"), "another value than it begins"),
@@ -99,6 +102,22 @@ def test_an_axis_corrected_in_two_places() -> None:
     found = CONTROL.lint({"AX1_EEC.INI": EEC, "NC_CEC.INI": own})
     assert [message.code for message in found] == ["NCF492"]
     assert "is corrected twice" in found[0].text
+
+
+def test_tables_of_two_files_are_not_added_up_where_the_control_takes_one() -> None:
+    """Of a table that is loaded twice the last counts; of two encoders of an axis the one that is switched on."""
+    second = EEC.replace(b"COMP[0", b"COMP[1").replace(b"_STEP[0", b"_STEP[1").replace(b"_MIN[0", b"_MIN[1")
+    second = second.replace(b"_MAX[0", b"_MAX[1").replace(b"MODULO[0", b"MODULO[1")
+    for files, said in (
+        ({"A.INI": GOOD, "B.INI": GOOD}, "table 1 is in more than one file"),
+        ({"A.INI": EEC, "B.INI": EEC}, "AX1 has more than one encoder table"),
+        ({"A.INI": EEC, "B.INI": second}, "AX1 has more than one encoder table"),
+    ):
+        assert [(message.code, said in message.text) for message in CONTROL.lint(files)] == [("NCF491", True)]
+        with pytest.raises(ConfigError, match=said):
+            CONTROL.read(files)
+    unused = re.sub(rb"(\[1,\d,AX1\])=.*", rb"\1=0", second)
+    assert at({"A.INI": EEC, "B.INI": unused}, X=-100)[0] == pytest.approx(-0.010)
 
 
 @pytest.mark.parametrize(

@@ -45,6 +45,10 @@ ANOTHER_ERROR = re.compile(r"\.rt[a-km-z]")
 """Suffixes of files of other errors, such as angles (.rta) and straightness (.rts), with the sections of `.rtl`."""
 MICROMETRE = 1e-3
 """mm per micrometre."""
+METRIC = re.compile(r"(?:[\W\d]|mm|metric|millimet(?:re|er)s?|[u\u00b5\u03bc]m|microns?|micromet(?:re|er)s?)*", re.IGNORECASE)
+"""A line of an `.rtl` about units that names those in which it is read."""
+ONCE = ("axis", "targets", "target-count", "run-count", "run target data")
+"""Keys of an `.rtl` that stand there once."""
 
 Reader = Callable[[str, str], Measurement | None]
 """A function of text and path that returns a measurement, or None if it does not know the format."""
@@ -183,10 +187,11 @@ def isg(text: str, path: str) -> Measurement:
         words = re.split(r"[\s;,]+", line.split("//")[0].strip())
         if not words[0] or number <= where.line:
             continue
-        if len(words) != len(names):
-            hint = "numbers have a decimal point" if re.search(r"\d,\d", line) else ""
-            text = f"{len(words)} cells, but {len(names)} columns"
-            raise ConfigError.of("NCF606", text, Place(path, number, 0, line), hint)
+        hint = "numbers have a decimal point" if re.search(r"\d,\d", line) else ""
+        if len(words) != len(names) or (hint and ";" in line):
+            same = len(words) == len(names)
+            said = "a decimal comma" if same else f"{len(words)} cells, but {len(names)} columns"
+            raise ConfigError.of("NCF606", said, Place(path, number, 0, line), hint)
         values = [number_of(word, path, number) for word in words]
         for name, value in zip(components, values[1:], strict=True):
             if ERROR.fullmatch(name):
@@ -221,12 +226,16 @@ def etalon(text: str, path: str) -> Measurement:
 
     Squareness values are skipped with a remark.
     """
-    rows, section = Rows(path), ""
+    rows, section, seen = Rows(path), "", set[str]()
     for number, line in enumerate(text.splitlines(), 1):
         plain = line.split("//")[0].strip()
         words = re.sub(r"^Gridpoints\s*=\s*\{|\}$", "", plain).split()
         if match := GRID.fullmatch(plain):
             section = match[1]
+            if section in seen:
+                hint = "give each measurement as a file of its own"
+                raise ConfigError.of("NCF618", f"[{section}] is there twice", Place(path, number, 1, line), hint)
+            seen.add(section)
         elif section and re.match(r"VALUE\s*=", plain):
             rows.remarks.append(Message("NCF618", _located(f"E{section}", section), Place(path, number, 1, line)))
         elif len(words) == 2 and ERROR.fullmatch(section):
@@ -304,6 +313,9 @@ class Rtl:
 
     def checked(self) -> Rtl:
         """The file, checked for consistent counts and targets; raises `ConfigError` NCF609, NCF618."""
+        for key, (text, line) in self.texts.items():
+            if (key == "unit" or key.endswith("units")) and not METRIC.fullmatch(text):
+                raise self.odd(f"{key} {text!r}: targets are read as mm, deviations as um", line, "convert the numbers")
         counts = {"target-count": len(self.targets), "run-count": len({each.run for each in self.readings})}
         if not self.targets:
             raise self.odd("there is no line `Targets:`, or nothing below it", 0)
@@ -335,6 +347,8 @@ def _rtl(text: str, path: str) -> Rtl:
             section, key = match[1], ""
         elif match := KEY.match(plain):
             key = match[1].lower()
+            if key in ONCE and key in found.texts:
+                raise found.odd(f"`{match[1]}:` is there twice", number, "one measurement in a file")
             found.texts.setdefault(key, (match[2].strip(), number))
             plain = match[2]
         if key == "targets":

@@ -33,6 +33,8 @@ ONCE = ("ncfix-measurement", "kind", "noise_um", "noise_urad", "point", "frame",
 NAMED = {"distance": (2, 2), "target": (1, 3)}
 """Header key -> numbers of names and of numbers in its value, such as `distance: 1 2 304.6686 0.0012`."""
 COMMA = re.compile(r"[-+]?\d+,\d+")
+QUOTED = re.compile(r'^"(#[^"]*)"')
+"""A header line as spreadsheets write it that quote every text."""
 NOT_READ = "leave out the row if this was not read"
 UNITS = r"mm|cm|m|in|inch|deg|degrees?|\u00b0|m?rad|[u\u00b5\u03bc](?:m|rad)|arcsec|as|\"|''|s|sec"
 """As units are written; the micro sign has two characters."""
@@ -74,7 +76,8 @@ def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bo
     if text is None or what:
         said = f"{what}, not a measurement file" if what else "not a text file"
         raise ConfigError.of("NCF600", said, Place(path), hint or "save it as CSV")
-    lines = MeasurementLines(path, text.splitlines(), not text.endswith(("\n", "\r")))
+    rows = [QUOTED.sub(r"\1", line) for line in text.splitlines()]
+    lines = MeasurementLines(path, rows, not text.endswith(("\n", "\r")))
     measurement = _measurement(lines, machine, plan)
     checked = checks.checked(measurement, machine, lines.lines)
     return _sensed(checked, machine) if measurement.kind == "axis" else checked
