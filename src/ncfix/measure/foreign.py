@@ -45,7 +45,9 @@ ANOTHER_ERROR = re.compile(r"\.rt[a-km-z]")
 """Suffixes of files of other errors, such as angles (.rta) and straightness (.rts), with the sections of `.rtl`."""
 MICROMETRE = 1e-3
 """mm per micrometre."""
-METRIC = re.compile(r"(?:[\W\d]|mm|metric|millimet(?:re|er)s?|[u\u00b5\u03bc]m|microns?|micromet(?:re|er)s?)*", re.IGNORECASE)
+METRIC = re.compile(
+    r"(?:[\W\d]|mm|metric|millimet(?:re|er)s?|[u\u00b5\u03bc]m|microns?|micromet(?:re|er)s?)*", re.IGNORECASE
+)
 """A line of an `.rtl` about units that names those in which it is read."""
 ONCE = ("axis", "targets", "target-count", "run-count", "run target data")
 """Keys of an `.rtl` that stand there once."""
