@@ -20,7 +20,7 @@ from ncfix.arrays import Array
 from ncfix.machine import Axis, Machine, State
 from ncfix.tables.axis_tables import nodes_needed
 from ncfix.tables.compensation import Compensation, Term
-from ncfix.tables.correction import even_poses, poses_along
+from ncfix.tables.correction import even_poses, poses_along, steps_towards
 from ncfix.tables.grid import Grid, projector
 from ncfix.tables.table_files import DEGREE, TURNING, Remarks, unit_of
 from ncfix.values import frozen
@@ -113,7 +113,7 @@ class ErrorChain:
         moved = q.copy()
         for _ in range(2):
             gap = nominal - self.tip(names, moved, True)
-            moved[:, linear] += np.linalg.solve(jacobian, gap[..., None])[..., 0]
+            moved[:, linear] += steps_towards(gap, jacobian)
         correction[:, linear] += (moved - q)[:, linear]
         return correction
 

@@ -11,7 +11,15 @@ import pytest
 
 from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import State, load, loads
-from ncfix.tables.correction import corners, even_poses, exact_correction, linear_axes, random_poses, ranges_of
+from ncfix.tables.correction import (
+    corners,
+    even_poses,
+    exact_correction,
+    linear_axes,
+    random_poses,
+    ranges_of,
+    steps_towards,
+)
 from ncfix.tables.volume import Volume, inputs_that_matter, search
 from ncfix.testing import single_error
 from tables import table_4_2
@@ -98,6 +106,14 @@ def test_what_cannot_be_corrected_is_refused() -> None:
     machine = single_error("EXX", 3e6)
     with pytest.raises(RefusedError) as caught:
         exact_correction(machine, random_poses(ranges_of(machine), 20), State())
+    assert caught.value.code == "NCF482"
+
+
+def test_linear_axes_that_a_rotary_one_turns_into_one_plane_are_refused() -> None:
+    """A Y that a rotary axis between X and Y has turned along X."""
+    flat = np.array([[[1.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
+    with pytest.raises(RefusedError, match="do not span space") as caught:
+        steps_towards(np.ones((1, 3)), flat)
     assert caught.value.code == "NCF482"
 
 

@@ -64,9 +64,21 @@ def exact_correction(machine: Machine, q: Array, state: State, start: Array | No
             return correction
         if number % ANEW == 0:
             jacobian = machine.axis_jacobian(q + correction, state.tool_length)[..., :3, columns]
-        correction[:, columns] += np.linalg.solve(jacobian, gap[..., None])[..., 0]
+        correction[:, columns] += steps_towards(gap, jacobian)
     text = "no correction found that brings the tip to its nominal position"
     raise RefusedError.of("NCF482", text, hint="look for a jump in the errors of the machine file")
+
+
+def steps_towards(gap: Array, jacobian: Array) -> Array:
+    """Steps (n, 3) of three linear axes that move the tip by `gap` (n, 3); `jacobian` (n, 3, 3): by their columns.
+
+    Raises `RefusedError` NCF482 if a rotary axis between them has turned two of the axes into one plane with the third.
+    """
+    try:
+        return np.asarray(np.linalg.solve(jacobian, gap[..., None])[..., 0], dtype=np.float64)
+    except np.linalg.LinAlgError:
+        text = "a rotary axis turns the linear axes so that they do not span space"
+        raise RefusedError.of("NCF482", text, hint="--range without this angle") from None
 
 
 def own_rotary_correction(machine: Machine, q: Array, state: State) -> Array:
