@@ -162,7 +162,7 @@ class Parts:
         """Wanted size of the next part, bytes: smaller for the first part, and under TCP, which needs more memory."""
         if not self.found:
             return self.size // 8
-        return self.size // 3 if self.tcp else self.size
+        return self.size // 2 if self.tcp else self.size
 
     def _texts(self) -> Iterator[tuple[Program, bool, PartCheckpoint | None]]:
         """Stretches of text that end between two blocks of plain words, True with the last one, and its checkpoint.
