@@ -13,6 +13,7 @@ import pytest
 
 from conftest import require_core
 from ncfix import core
+from ncfix.writer.bulk import Room
 
 TEXT = b"N1 X1.5 Y-2.25 F9\nX3.\n"
 ROOM = 38
@@ -73,22 +74,20 @@ def rules(powers: int = 19, longest: int = 16) -> Any:
     return core.loops("words").NumberRules(10.0 ** np.arange(powers), longest, 9, 1e15, 1e-12, 1.5)
 
 
-def pen(**other: Any) -> Any:
-    return core.loops("words").WordPrinter(rules(), *tables(**other).values())
+def pen(room: Room | None = None, **other: Any) -> Any:
+    return core.loops("words").WordPrinter(rules(), (room or Room(9, 400)).buffer, *tables(**other).values())
 
 
-def written(ends: Any, pieces: Any, *, rows: Any = (0, 1), room: Any = (9, 9, 9, 400), **other: Any) -> tuple[Any, ...]:
+def written(ends: Any, pieces: Any, *, rows: Any = (0, 1), room: Any = (9, 400), **other: Any) -> tuple[Any, ...]:
     """How many pieces are written, the text then, and the commands."""
-    own, ends = pen(**other), np.array(ends, dtype=np.float64)
+    into, ends = Room(*room), np.array(ends, dtype=np.float64)
     commands = np.zeros((len(ends), AXES))
-    start, stop, length = (np.zeros(size, dtype=np.int64) for size in room[:3])
-    data = np.zeros(room[3], dtype=np.uint8)
-    done = own.write(np.array(rows, dtype=np.int32), ends, np.array(pieces), commands, start, stop, length, data)
-    text, at, taken = b"", 0, 0
-    for k in range(own.edits):
-        text += TEXT[at : start[k]] + data[taken : taken + length[k]].tobytes()
-        at, taken = int(stop[k]), taken + int(length[k])
-    assert taken == own.size
+    done = pen(into, **other).write(np.array(rows, dtype=np.int32), ends, np.array(pieces), commands)
+    edits, text, at, taken = into.splices, b"", 0, 0
+    for start, stop, length in zip(edits.start, edits.stop, edits.length, strict=True):
+        text += TEXT[at:start] + edits.data[taken : taken + length]
+        at, taken = int(stop), taken + int(length)
+    assert taken == len(edits.data)
     return done, text + TEXT[at:], commands[:done]
 
 
@@ -195,10 +194,10 @@ def test_a_number_keeps_its_style(number: bytes, value: float, signed: bool, tex
         "anchors": ints((0, 0), (0, 0)),
         "leads": ints((-1, 0), (-1, 0)),
     }
-    own = pen(**program, signed=signed)
-    room, data, commands = [np.zeros(5, dtype=np.int64) for _ in range(3)], np.zeros(99, np.uint8), np.zeros((1, AXES))
-    done = own.write(np.zeros(1, np.int32), np.array([[value, 0.0]]), np.array([0, 1]), commands, *room, data)
-    assert (data[: own.size].tobytes() if done else None) == text
+    room, commands = Room(5, 99), np.zeros((1, AXES))
+    own = pen(room, **program, signed=signed)
+    done = own.write(np.zeros(1, np.int32), np.array([[value, 0.0]]), np.array([0, 1]), commands)
+    assert (room.splices.data if done else None) == text
     if text is not None:
         assert commands[0, 0] == float(text)
 
@@ -208,9 +207,8 @@ def test_a_number_keeps_its_style(number: bytes, value: float, signed: bool, tex
 
 @pytest.mark.parametrize(("powers", "longest", "right"), [(19, 16, True), (18, 16, False), (19, 17, False)])
 def test_rules_are_those_of_numbers_that_there_is_room_for(powers: int, longest: int, right: bool) -> None:
-    assert pen().room == ROOM
     if right:
-        rules(powers, longest)
+        assert rules(powers, longest).room == ROOM
     else:
         with pytest.raises(IndexError):
             rules(powers, longest)
@@ -293,10 +291,9 @@ def test_there_has_to_be_room_for_all_that_may_be_written() -> None:
     """Of each piece for all its words, and a line that repeats the head of its block; of each block for its edits."""
     around = 1 + 3 + 4  # the end of a line, and what stands around its words
     most = 2 * (AXES * ROOM + around) + len(b"N1 ")
-    assert written(ENDS[:2], [0, 2], rows=[0], room=(4, 4, 4, most))[0] == 2
-    for room in ((3, 4, 4, most), (4, 3, 4, most), (4, 4, 3, most)):
-        assert written(ENDS[:2], [0, 2], rows=[0], room=room)[0] == 2
-    for room in ((2, 4, 4, most), (4, 2, 4, most), (4, 4, 2, most), (4, 4, 4, most - 1)):
+    for edits in (3, 4):
+        assert written(ENDS[:2], [0, 2], rows=[0], room=(edits, most))[0] == 2
+    for room in ((2, most), (4, most - 1)):
         with pytest.raises(IndexError):
             written(ENDS[:2], [0, 2], rows=[0], room=room)
     for ends in ([[1.0]], [[1.0, 2.0, 3.0]]):
@@ -306,7 +303,6 @@ def test_there_has_to_be_room_for_all_that_may_be_written() -> None:
 
 def centred(other: dict[str, Any], wanted: tuple[float, float] = (2.5, 0.25), **arguments: Any) -> tuple[Any, ...]:
     """Whether the centre words of an arc are certain, the text with them, and the centre; the F of `TEXT` is its I."""
-    own = pen(**other)
     given = {
         "rows": np.array([0], dtype=np.int32),
         "plane": ints((0, 1)),
@@ -316,22 +312,23 @@ def centred(other: dict[str, Any], wanted: tuple[float, float] = (2.5, 0.25), **
         "heads": characters([b" I", b" J", b" K"], [b" I", b" J", b" K"]),
         "radius": ints(-1, -1),
         "taken": ints(((2, 0), (3, 0)), ((-1, 0), (-1, 0))),
-        "start": np.zeros(3, dtype=np.int64),
-        "stop": np.zeros(3, dtype=np.int64),
-        "length": np.zeros(3, dtype=np.int64),
-        "data": np.zeros(2 * ROOM, dtype=np.uint8),
+        "room": (3, 2 * ROOM),
         "centre": np.zeros((1, 2)),
         "clear": np.zeros(1, dtype=np.uint8),
     }
     assert given.keys() >= arguments.keys()
     given |= arguments
-    own.write_centres(*given.values())
-    text, taken, start, stop = TEXT, own.size, given["start"], given["stop"]
-    for k in sorted(range(own.edits), key=lambda k: (start[k], stop[k] > start[k], k), reverse=True):
-        at = int(given["length"][:k].sum())
-        text = text[: start[k]] + given["data"][at : at + given["length"][k]].tobytes() + text[stop[k] :]
-    assert taken == given["length"][: own.edits].sum()
-    return bool(given["clear"][0]), text.splitlines()[0], given["centre"][0].tolist()
+    room = Room(*given.pop("room"))
+    words = core.loops("words").CentreWords(*(given.pop(name) for name in ("slots", "heads", "radius", "taken")))
+    centre, clear = given.pop("centre"), given.pop("clear")
+    pen(room, **other).write_centres(*given.values(), words, centre, clear)
+    text, edits = TEXT, room.splices
+    start, stop, length = edits.start, edits.stop, edits.length
+    for k in sorted(range(len(start)), key=lambda k: (start[k], stop[k] > start[k], k), reverse=True):
+        at = int(length[:k].sum())
+        text = text[: start[k]] + edits.data[at : at + length[k]] + text[stop[k] :]
+    assert len(edits.data) == length.sum()
+    return bool(clear[0]), text.splitlines()[0], centre[0].tolist()
 
 
 BY_RADIUS = {"slots": ints((-1, -1, -1), (-1, -1, -1)), "radius": ints(3, -1)}
@@ -374,14 +371,23 @@ def test_centres_that_are_not_certain_are_left_as_they_are() -> None:
         *({"radius": ints(slot, -1)} for slot in (5, -2)),
         *({"taken": ints(((slot, 0), (3, 0)), ((-1, 0), (-1, 0)))} for slot in (5, -3)),
         *({"taken": ints(((2, 0), (slot, 0)), ((-1, 0), (-1, 0)))} for slot in (5, -3)),
-        *({name: np.zeros(2, dtype=np.int64)} for name in ("start", "stop", "length")),
-        {"data": np.zeros(2 * ROOM - 1, dtype=np.uint8)},
+        *({"room": room} for room in ((2, 2 * ROOM), (3, 2 * ROOM - 1))),
         {"centre": np.zeros((0, 2))},
         {"clear": np.zeros(0, dtype=np.uint8)},
         {"places": np.zeros((1, 3, 2))},
         {"heads": characters([b" I", b" J"], [b" I", b" J"])},
+        {"slots": ints((3, -1, -1))},
+        {"radius": ints(-1)},
+        {"taken": ints(((2, 0), (3, 0)))},
     ],
 )
 def test_arcs_that_are_not_in_the_text_are_refused(other: dict[str, Any]) -> None:
     with pytest.raises(IndexError):
         centred({}, **other)
+
+
+def test_the_columns_of_edits_have_one_length() -> None:
+    columns = [np.zeros(size, dtype=np.int64) for size in (2, 2, 3)]
+    for k in range(3):
+        with pytest.raises(IndexError):
+            core.loops("edits").EditBuffer(*columns[k:], *columns[:k], np.zeros(9, dtype=np.uint8))

@@ -94,8 +94,9 @@ def both_forms() -> Iterator[Counter[str]]:
     core.use("compiled")
     CALLS.clear()
     with pytest.MonkeyPatch.context() as patch:
-        for module in core.names():
-            compiled, interpreted = import_module(f"ncfix.core.{module}"), core.interpreted(module)
+        modules = {name: import_module(f"ncfix.core.{name}") for name in core.names()}  # they take types of one another
+        for module, compiled in modules.items():
+            interpreted = core.interpreted(module)
             for name, own in vars(compiled).items():
                 other = getattr(interpreted, name, None)
                 if callable(other) and getattr(own, "__module__", None) == compiled.__name__:

@@ -1,5 +1,5 @@
 # cython: boundscheck=False
-"""Applies edits to a text, and checks that a text differs from another one by its edits only."""
+"""Collects the edits of a text, applies them, and checks that a text differs from another one by its edits only."""
 
 from __future__ import annotations
 
@@ -13,6 +13,42 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
 
 OTHER_LENGTH = "the text has another length than its room"
+
+
+class EditBuffer:
+    """Room for the edits of a text, columns as in `text.writer.Splices`.
+
+    start, stop, length  (n,) the bytes that each edit replaces, and the number of bytes it puts there
+    data    these bytes
+    count   number of edits so far
+    size    number of bytes so far
+
+    Raises IndexError if the columns have different lengths.
+    """
+
+    def __init__(self, start: Ints, stop: Ints, length: Ints, data: Bytes) -> None:
+        if not start.shape[0] == stop.shape[0] == length.shape[0]:
+            raise IndexError("not as many of everything as there are edits")
+        self.start, self.stop, self.length, self.data = start, stop, length, data
+        self.count = self.size = 0
+
+    def has_room(self, edits: int, size: int) -> bool:
+        """Whether so many edits, with so many bytes together, may be added."""
+        return self.count + edits <= self.start.shape[0] and self.size + size <= self.data.shape[0]
+
+    def put(self, character: int) -> None:
+        """Append a byte to `data`; there must be room."""
+        self.data[self.size] = character
+        self.size += 1
+
+    def note(self, begin: int, end: int, size: int) -> None:
+        """Append an edit: the bytes from `begin` to `end` become the last `size` bytes of `data`; with room only."""
+        self.start[self.count], self.stop[self.count], self.length[self.count] = begin, end, size
+        self.count += 1
+
+    def back_to(self, count: int, size: int) -> None:
+        """Forget all edits behind the first `count` ones, which have `size` bytes."""
+        self.count, self.size = count, size
 
 
 def spliced(source: Bytes, start: Ints, stop: Ints, length: Ints, data: Bytes, out: Bytes) -> int:

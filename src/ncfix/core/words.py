@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from ncfix.core.edits import EditBuffer
+
     Bytes = NDArray[np.uint8]
     Ints = NDArray[np.int64]
     Rows = NDArray[np.int32]
@@ -45,18 +47,34 @@ class NumberRules:
     largest   output steps from which on a value is not certain
     tie       relative distance from the middle between two outputs within which a value is not certain
     rounded   half output steps by which rounding alone may displace an axis
+    room      largest number of bytes of a word
     """
 
     def __init__(self, powers: Floats, longest: int, decimals: int, largest: float, tie: float, rounded: float) -> None:
         self.powers, self.longest, self.decimals = powers, longest, decimals
-        self.largest, self.tie, self.rounded = largest, tie, rounded
+        self.largest, self.tie, self.rounded, self.room = largest, tie, rounded, ROOM
         if len(powers) <= MOST_STEPS or longest + MOST_STEPS + 4 > ROOM:
             raise IndexError("these are not the rules of numbers that are written here")
+
+
+class CentreWords:
+    """The words for centres: `centre`, `centre_heads`, `radius` and `taken` of `writer.bulk_layouts.Layouts`.
+
+    Raises IndexError for tables of different sizes.
+    """
+
+    def __init__(self, slots: Ints, heads: Bytes, radius: Ints, taken: Ints) -> None:
+        self.slots, self.heads, self.radius, self.taken = slots, heads, radius, taken
+        right = slots.shape[0] == heads.shape[0] == radius.shape[0] == taken.shape[0]
+        right = right and slots.shape[1] == heads.shape[1] == 3
+        if not right or not heads.shape[2] == taken.shape[1] == taken.shape[2] == 2:
+            raise IndexError("these are not the words of the centres of arcs")
 
 
 class WordPrinter:
     """Writes the edits of motions of a program.
 
+    into       receives the edits
     text       text of the program
     edges, first, template  spans (n, 2) of its blocks; first number and template of each block
     values, spans  values and spans of its numbers
@@ -69,12 +87,12 @@ class WordPrinter:
     here       (axes,) current command of the control
     wanted, now, told  (axes,) scratch space: numbers wanted at the end of a piece, numbers that the text gives there,
                and whether a word gives them
-    room       largest number of bytes of a word
     """
 
     def __init__(
         self,
         rules: NumberRules,
+        into: EditBuffer,
         text: Bytes,
         edges: Ints,
         first: Ints,
@@ -100,13 +118,13 @@ class WordPrinter:
         now: Floats,
         told: Ints,
     ) -> None:
-        self.rules, self.text, self.edges, self.first, self.template = rules, text, edges, first, template
+        self.rules, self.into, self.text, self.edges = rules, into, text, edges
+        self.first, self.template = first, template
         self.values, self.spans, self.slots, self.by_place, self.by_letter = values, spans, slots, by_place, by_letter
         self.anchors, self.heads, self.leads, self.openings, self.closings = anchors, heads, leads, openings, closings
         self.line_end, self.offset, self.scale, self.least, self.half = line_end, offset, scale, least, half
         self.signed, self.here, self.wanted, self.now, self.told = signed, here, wanted, now, told
-        self.edits = self.size = self.at = self.own = self.whole = 0
-        self.room = ROOM
+        self.own = self.whole = 0
         self.point = self.plus = False
         self.read = 0.0
         axes, shapes = len(here), len(slots)
@@ -131,56 +149,52 @@ class WordPrinter:
         if not right:
             raise IndexError("these are not the tables of a program")
 
-    def write(
-        self, rows: Rows, ends: Floats, pieces: Ints, commands: Floats, start: Ints, stop: Ints, length: Ints,
-        data: Bytes,
-    ) -> int:  # fmt: skip
+    def write(self, rows: Rows, ends: Floats, pieces: Ints, commands: Floats) -> int:
         """Write motions up to the first one that is not certain; returns the number of pieces written.
 
         rows      (k,) the block of each motion
         ends      (m, axes) wanted commands at the ends of their pieces
         pieces    (k + 1,) first piece of each motion, and m
         commands  receives the commands at the ends of the pieces, as written
-        start, stop, length, data  receive the edits, as in `text.writer.Splices`: `edits` of them, `size` bytes
         """
-        done, axes, room = 0, self.here.shape[0], min(start.shape[0], stop.shape[0], length.shape[0])
+        done, axes = 0, self.here.shape[0]
         if pieces.shape[0] <= rows.shape[0] or ends.shape[1] != axes or commands.shape[1] != axes:
             raise IndexError("there is no room for what is written")
         for row in range(rows.shape[0]):
-            block, edits, size = rows[row], self.edits, self.size
+            block, count, size = rows[row], self.into.count, self.into.size
             first_piece, last_piece = pieces[row], pieces[row + 1] - 1
             if not 0 <= block < self.edges.shape[0]:
                 raise IndexError("there is no such block")
             if not 0 <= first_piece <= last_piece < min(ends.shape[0], commands.shape[0]):
                 raise IndexError("there is no such piece")
             shape, number, several = self.template[block], self.first[block], first_piece < last_piece
-            if not self.fits(block, shape, number) or edits + axes >= room:
+            if not self.fits(block, shape, number):
                 raise IndexError("there is no room for a block")
-            if size + self.most(block, shape, number, last_piece - first_piece) > data.shape[0]:
+            if not self.into.has_room(axes + 1, self.most(block, shape, number, last_piece - first_piece)):
                 raise IndexError("there is no room for a block")
             for axis in range(self.here.shape[0]):
                 self.now[axis] = (self.here[axis] - self.offset[axis]) / self.scale[axis]
                 self.wanted[axis] = (ends[first_piece, axis] - self.offset[axis]) / self.scale[axis]
                 self.told[axis] = 0
-            clear = self.rewrite_words(number, shape, several, start, stop, length, data)
+            clear = self.rewrite_words(number, shape, several)
             if clear:
                 place = self.place_of(self.anchors[shape, 0], self.anchors[shape, 1], block, number)
-                clear = self.add_words(place, shape, start, stop, length, data)
+                clear = self.add_words(place, shape)
             if clear:
                 self.arrive(commands, first_piece)
             if clear and several:
-                begun = self.size
+                begun = self.into.size
                 lead = self.place_of(self.leads[shape, 0], self.leads[shape, 1], block, number)
                 for piece in range(first_piece + 1, last_piece + 1):
                     for axis in range(self.here.shape[0]):
                         self.wanted[axis] = (ends[piece, axis] - self.offset[axis]) / self.scale[axis]
-                    clear = clear and self.put_line(self.edges[block, 0], lead, shape, data)
+                    clear = clear and self.put_line(self.edges[block, 0], lead, shape)
                     if clear:
                         self.arrive(commands, piece)
                 if clear:
-                    self.note(start, stop, length, self.edges[block, 1], self.edges[block, 1], self.size - begun)
+                    self.into.note(self.edges[block, 1], self.edges[block, 1], self.into.size - begun)
             if not clear:
-                self.edits, self.size = edits, size
+                self.into.back_to(count, size)
                 break
             done = last_piece + 1
             for axis in range(self.here.shape[0]):
@@ -220,33 +234,26 @@ class WordPrinter:
         place = self.spans[number + slot, 1] if slot >= 0 else self.edges[block, -1 - slot]
         return int(beyond + place)
 
-    def note(self, start: Ints, stop: Ints, length: Ints, begin: int, end: int, size: int) -> None:
-        """Store an edit that replaces the bytes from `begin` to `end` by `size` bytes."""
-        start[self.edits], stop[self.edits], length[self.edits] = begin, end, size
-        self.edits += 1
-
-    def rewrite_words(
-        self, number: int, shape: int, several: bool, start: Ints, stop: Ints, length: Ints, data: Bytes
-    ) -> bool:
+    def rewrite_words(self, number: int, shape: int, several: bool) -> bool:
         """Rewrite words whose values change, or all if there are `several` pieces; returns whether they are certain."""
         for k in range(self.by_place.shape[1]):
             axis = self.by_place[shape, k]
             if axis < 0:
                 break
-            word, begun = number + self.slots[shape, axis], self.size
+            word, begun = number + self.slots[shape, axis], self.into.size
             self.now[axis], self.told[axis] = self.values[word], 1
             if abs(self.wanted[axis] - self.now[axis]) >= self.half[axis] or several:
                 begin, end = self.spans[word, 0], self.spans[word, 1]
-                if not self.put_in_style(data, begin, end, self.wanted[axis], self.least[axis]):
+                if not self.put_in_style(begin, end, self.wanted[axis], self.least[axis]):
                     return False
                 self.now[axis] = self.read
-                self.note(start, stop, length, begin, end, self.size - begun)
+                self.into.note(begin, end, self.into.size - begun)
         return True
 
-    def add_words(self, place: int, shape: int, start: Ints, stop: Ints, length: Ints, data: Bytes) -> bool:
+    def add_words(self, place: int, shape: int) -> bool:
         """Add words at `place` for axes that must move and have none; returns whether they are certain."""
         for k in range(self.by_letter.shape[0]):
-            axis, begun = self.by_letter[k], self.size
+            axis, begun = self.by_letter[k], self.into.size
             if self.heads[shape, axis, 1] == VECTOR_HEAD:
                 self.now[axis], self.told[axis] = self.wanted[axis], 1
             off = abs(self.wanted[axis] - self.now[axis])
@@ -257,25 +264,25 @@ class WordPrinter:
                     return False
                 continue
             blank, letter = self.heads[shape, axis, 0], self.heads[shape, axis, 1]
-            if not self.put_new(data, self.wanted[axis], self.least[axis], blank, letter):
+            if not self.put_new(self.wanted[axis], self.least[axis], blank, letter):
                 return False
             self.now[axis], self.told[axis] = self.read, 1
-            self.note(start, stop, length, place, place, self.size - begun)
+            self.into.note(place, place, self.into.size - begun)
         return True
 
-    def put_line(self, lead_from: int, lead_to: int, shape: int, data: Bytes) -> bool:
+    def put_line(self, lead_from: int, lead_to: int, shape: int) -> bool:
         """Write a further piece of a motion on a line of its own; returns whether it is certain.
 
         The line repeats the bytes from `lead_from` to `lead_to` of the text. A piece that moves no axis is left to
         `BlockWriter`.
         """
         for k in range(self.line_end.shape[0]):
-            self.put_byte(data, self.line_end[k])
+            self.into.put(self.line_end[k])
         for at in range(lead_from, lead_to):
-            self.put_byte(data, self.text[at])
+            self.into.put(self.text[at])
         for k in range(self.openings.shape[1]):
             if self.openings[shape, k]:
-                self.put_byte(data, self.openings[shape, k])
+                self.into.put(self.openings[shape, k])
         moved = False
         for k in range(self.by_letter.shape[0]):
             axis = self.by_letter[k]
@@ -288,80 +295,76 @@ class WordPrinter:
                 continue
             blank = self.heads[shape, axis, 0] if moved or self.openings[shape, 0] else 0
             letter = self.heads[shape, axis, 1]
-            if not self.put_new(data, self.wanted[axis], self.least[axis], blank, letter):
+            if not self.put_new(self.wanted[axis], self.least[axis], blank, letter):
                 return False
             self.now[axis], self.told[axis], moved = self.read, 1, True
         for k in range(self.closings.shape[1]):
             if self.closings[shape, k]:
-                self.put_byte(data, self.closings[shape, k])
+                self.into.put(self.closings[shape, k])
         return moved
 
     # -- centres of arcs ----------------------------------------------------------------------------------------------
 
     def write_centres(
-        self, rows: Rows, plane: Ints, spatial: Ints, places: Floats, slots: Ints, heads: Bytes, radius: Ints,
-        taken: Ints, start: Ints, stop: Ints, length: Ints, data: Bytes, centre: Floats, clear: Bytes,
-    ) -> int:  # fmt: skip
+        self, rows: Rows, plane: Ints, spatial: Ints, places: Floats, words: CentreWords, centre: Floats, clear: Bytes
+    ) -> int:
         """Write the centre words of arcs whose axis words are written already.
 
         rows     (k,) their blocks
         plane    (k, 2) the axes of their planes, X Y Z being 0 1 2
         spatial  (3,) the columns of X, Y and Z
         places   (k, 4, 2) in the plane, program units: start, end, wanted centre, and what the centre words count from
-        slots, heads, radius, taken  `centre`, `centre_heads`, `radius` and `taken` of `writer.bulk_layouts.Layouts`
-        start, stop, length, data  room for the edits, as in `write`
+        words    the words for centres in blocks of each shape
         centre   (k, 2) receives the centre that the text means, program units
         clear    (k,) receives 1, or 0 for an arc that is not certain: nothing is written of it
         """
-        n, shapes = rows.shape[0], self.slots.shape[0]
-        right = min(slots.shape[0], heads.shape[0], radius.shape[0], taken.shape[0]) >= shapes
-        right = right and slots.shape[1] == heads.shape[1] == spatial.shape[0] == 3
-        right = right and heads.shape[2] == taken.shape[1] == taken.shape[2] == 2
+        n = rows.shape[0]
+        right = words.slots.shape[0] >= self.slots.shape[0] and spatial.shape[0] == 3
         right = right and min(plane.shape[0], places.shape[0], centre.shape[0], clear.shape[0]) >= n
         right = right and plane.shape[1] == centre.shape[1] == places.shape[2] == 2 and places.shape[1] == 4
-        right = right and min(start.shape[0], stop.shape[0], length.shape[0]) >= 3 * n
-        if not right or data.shape[0] < 2 * self.room * n:
+        if not right or not self.into.has_room(3 * n, 2 * ROOM * n):
             raise IndexError("there is no room for the centres of arcs")
         for row in range(n):
-            block, edits, size = rows[row], self.edits, self.size
+            block, count, size = rows[row], self.into.count, self.into.size
             if not 0 <= block < self.edges.shape[0]:
                 raise IndexError("there is no such block")
             shape, number = self.template[block], self.first[block]
-            right = self.fits(block, shape, number) and self.is_number(number, radius[shape])
-            right = right and taken[shape, 0, 0] >= -2 and number + taken[shape, 0, 0] < self.spans.shape[0]
-            right = right and taken[shape, 1, 0] >= -2 and number + taken[shape, 1, 0] < self.spans.shape[0]
+            right = self.fits(block, shape, number) and self.is_number(number, words.radius[shape])
+            right = right and words.taken[shape, 0, 0] >= -2 and number + words.taken[shape, 0, 0] < self.spans.shape[0]
+            right = right and words.taken[shape, 1, 0] >= -2 and number + words.taken[shape, 1, 0] < self.spans.shape[0]
             for k in range(2):
                 right = right and 0 <= plane[row, k] < 3 and 0 <= spatial[plane[row, k]] < self.here.shape[0]
-                right = right and self.is_number(number, slots[shape, plane[row, k]])
+                right = right and self.is_number(number, words.slots[shape, plane[row, k]])
             if not right:
                 raise IndexError("these are not the words of an arc")
             kept, certain = False, True
-            if radius[shape] >= 0:
+            if words.radius[shape] >= 0:
                 limit = 2 * self.half[spatial[plane[row, 0]]]
-                off = self.centre_by_radius(abs(self.values[number + radius[shape]]), places, row, centre)
+                off = self.centre_by_radius(abs(self.values[number + words.radius[shape]]), places, row, centre)
                 kept, certain = off <= limit, not (off < 0 or abs(off - limit) < CLOSE_CALL * limit / 2)
             for k in range(0 if kept or not certain else 2):
                 axis = spatial[plane[row, k]]
-                word, base = slots[shape, plane[row, k]], places[row, 3, k]
+                word, base = words.slots[shape, plane[row, k]], places[row, 3, k]
                 wanted, self.read = places[row, 2, k] - base, self.values[number + word] if word >= 0 else 0.0
                 if abs(wanted - self.read) >= self.half[axis]:
-                    begun = self.size
+                    begun = self.into.size
                     if word >= 0:
                         first, last = self.spans[number + word, 0], self.spans[number + word, 1]
-                        certain = certain and self.put_in_style(data, first, last, wanted, self.least[axis])
+                        certain = certain and self.put_in_style(first, last, wanted, self.least[axis])
                     else:
                         first = self.place_of(self.anchors[shape, 0], self.anchors[shape, 1], block, number)
-                        last, blank, letter = first, heads[shape, plane[row, k], 0], heads[shape, plane[row, k], 1]
-                        certain = certain and self.put_new(data, wanted, self.least[axis], blank, letter)
-                    self.note(start, stop, length, first, last, self.size - begun)
+                        last, blank = first, words.heads[shape, plane[row, k], 0]
+                        letter = words.heads[shape, plane[row, k], 1]
+                        certain = certain and self.put_new(wanted, self.least[axis], blank, letter)
+                    self.into.note(first, last, self.into.size - begun)
                 centre[row, k] = base + self.read
-            if certain and not kept and radius[shape] >= 0:
-                first = self.place_of(taken[shape, 0, 0], taken[shape, 0, 1], block, number)
-                last = self.place_of(taken[shape, 1, 0], taken[shape, 1, 1], block, number)
-                self.note(start, stop, length, first, last, 0)
+            if certain and not kept and words.radius[shape] >= 0:
+                first = self.place_of(words.taken[shape, 0, 0], words.taken[shape, 0, 1], block, number)
+                last = self.place_of(words.taken[shape, 1, 0], words.taken[shape, 1, 1], block, number)
+                self.into.note(first, last, 0)
             clear[row] = certain
             if not certain:
-                self.edits, self.size = edits, size
+                self.into.back_to(count, size)
         return 0
 
     def is_number(self, number: int, slot: int) -> bool:
@@ -398,28 +401,23 @@ class WordPrinter:
 
     # -- single numbers -----------------------------------------------------------------------------------------------
 
-    def put_byte(self, data: Bytes, character: int) -> None:
-        """Append a character."""
-        data[self.size] = character
-        self.size += 1
-
-    def put_new(self, data: Bytes, value: float, decimals: int, blank: int, letter: int) -> bool:
+    def put_new(self, value: float, decimals: int, blank: int, letter: int) -> bool:
         """Append a new word: blank (0 for none), letter and value; returns whether it is certain. Sets `read` to it."""
         steps = self.steps_of(value, decimals)
         if steps < 0:
             return False
         if blank:
-            self.put_byte(data, blank)
-        self.put_byte(data, letter)
+            self.into.put(blank)
+        self.into.put(letter)
         negative = copysign(1.0, value) < 0
         sign = MINUS if negative else 0
         if self.signed:
             sign = MINUS if value < 0 and steps != 0 else PLUS
-        self.put(data, steps, decimals, sign, 1, False)
+        self.put(steps, decimals, sign, 1, False)
         self.read = copysign(steps / self.rules.powers[decimals], value)
         return True
 
-    def put_in_style(self, data: Bytes, start: int, stop: int, value: float, least: int) -> bool:
+    def put_in_style(self, start: int, stop: int, value: float, least: int) -> bool:
         """Append a value in the style of the number at a span, as `NumberStyle.write`; returns whether it is certain.
 
         `read` receives the value that the text means.
@@ -438,7 +436,7 @@ class WordPrinter:
         digits = 1 if self.whole else -1
         if self.whole > 1 and self.text[stop - self.own - (1 if self.point else 0) - self.whole] == ZERO:
             digits = self.whole
-        self.put(data, steps, most, sign, digits, self.point)
+        self.put(steps, most, sign, digits, self.point)
         return True
 
     def style_of(self, start: int, stop: int) -> bool:
@@ -474,11 +472,11 @@ class WordPrinter:
             return -1
         return steps + 1 if rest > 0.5 else steps
 
-    def put(self, data: Bytes, steps: int, decimals: int, sign: int, least: int, point: bool) -> None:
+    def put(self, steps: int, decimals: int, sign: int, least: int, point: bool) -> None:
         """Append a number of output steps with at least `least` digits before the point; -1: none if it is zero."""
         if sign:
-            self.put_byte(data, sign)
-        count, rest = 0, steps
+            self.into.put(sign)
+        at, count, rest = self.into.size, 0, steps
         while rest:
             rest //= 10
             count += 1
@@ -486,13 +484,13 @@ class WordPrinter:
         pointed = point or decimals > 0
         length = digits + decimals + (1 if pointed else 0)
         rest = steps
-        data[self.size + length - 1] = ZERO  # there is room for all
+        self.into.data[at + length - 1] = ZERO  # there is room for all
         for k in range(decimals):
-            data[self.size + length - 1 - k] = ZERO + rest % 10
+            self.into.data[at + length - 1 - k] = ZERO + rest % 10
             rest //= 10
         if pointed:
-            data[self.size + digits] = POINT
+            self.into.data[at + digits] = POINT
         for k in range(digits):
-            data[self.size + digits - 1 - k] = ZERO + rest % 10
+            self.into.data[at + digits - 1 - k] = ZERO + rest % 10
             rest //= 10
-        self.size += length
+        self.into.size = at + length

@@ -36,6 +36,21 @@ CIRCLE_MM = 1e-3
 """Smallest distance of start and end of an arc written in bulk, mm: below it `BlockWriter` decides on a full circle."""
 
 
+class Room:
+    """Room for so many edits with so many bytes together, which the core fills in."""
+
+    def __init__(self, edits: int, size: int) -> None:
+        self.columns = tuple(np.empty(edits, dtype=np.int64) for _ in range(3))
+        self.data = np.empty(size, dtype=np.uint8)
+        self.buffer = core.loops("edits").EditBuffer(*self.columns, self.data)
+
+    @property
+    def splices(self) -> Splices:
+        """The edits so far."""
+        start, stop, length = (column[: self.buffer.count] for column in self.columns)
+        return Splices(start, stop, length, self.data[: self.buffer.size].tobytes())
+
+
 @mutable(slots=False)
 class Bulk:
     """The stretches of one emission.
@@ -162,17 +177,16 @@ class Bulk:
         start, end = (frame.program(each_end)[each, columns[plane]] for each_end in ends)
         fixed = layouts.fixed[program.template[block][:, None], plane] | self.moves.arc_absolute[rows, None]
         places = np.stack((start, end, centre[each, plane], np.where(fixed, 0.0, start)), axis=1)
-        tables = layouts.centre, layouts.centre_heads, layouts.radius, layouts.taken
-        begin, stop, length = (np.empty(3 * n, dtype=np.int64) for _ in range(3))
-        printer = self._printer(np.zeros(len(self.moves.axes)), frame, decimals)
+        words = core.loops("words").CentreWords(layouts.centre, layouts.centre_heads, layouts.radius, layouts.taken)
+        room = Room(3 * n, 2 * rules().room * n)
+        printer = self._printer(room, np.zeros(len(self.moves.axes)), frame, decimals)
         found, clear = np.empty((n, 2)), np.empty(n, dtype=np.uint8)
-        data = np.empty(2 * printer.room * n, dtype=np.uint8)
-        printer.write_centres(block, plane, columns, places, *tables, begin, stop, length, data, found, clear)
-        certain, edits = clear.astype(np.bool_), printer.edits
+        printer.write_centres(block, plane, columns, places, words, found, clear)
+        certain = clear.astype(np.bool_)
         if not certain.all():
             spans = program.blocks[block[~certain]]
             self.parts[:] = [part.outside(spans) for part in self.parts]
-        self.put(Splices(begin[:edits], stop[:edits], length[:edits], data[: printer.size].tobytes()))
+        self.put(room.splices)
         centre[each, plane] = found
         return certain, frame.command_point(centre[certain])
 
@@ -188,11 +202,12 @@ class Bulk:
         self.parts[-1] = self.parts[-1].outside(self.program.blocks[self.moves.block[rows]])
         self.added -= int(np.diff(self.first_piece)[rows].sum()) - len(rows)
 
-    def _printer(self, position: Array, frame: FrameMap, decimals: Ints) -> Any:
-        """What writes words in the core, from a command at which the control stands."""
+    def _printer(self, room: Room, position: Array, frame: FrameMap, decimals: Ints) -> Any:
+        """What writes words in the core, into `room`, from a command at which the control stands."""
         program, layouts, axes = self.program, self.layouts, len(position)
         return core.loops("words").WordPrinter(
             rules(),
+            room.buffer,
             self.text,
             program.blocks,
             program.first_number,
@@ -214,17 +229,13 @@ class Bulk:
 
     def _written(self, row: int, position: Array, frame: FrameMap, decimals: Ints) -> tuple[Array, Splices] | None:
         """The commands at the ends of the pieces of a stretch, (k, n_axes), and the edits to its axis words."""
-        stop, printer = int(self.stop[row]), self._printer(position, frame, decimals)
+        stop = int(self.stop[row])
         pieces = self.first_piece[row : stop + 1]
         ends, blocks = self.pieces.end[pieces[0] : pieces[-1]], self.moves.block[row:stop]
-        begin, end, length = (np.empty((stop - row) * (len(position) + 1), dtype=np.int64) for _ in range(3))
-        room = self._room(pieces, blocks, len(position) * printer.room)
-        commands, data = np.empty_like(ends), np.empty(room, dtype=np.uint8)
-        done = printer.write(blocks, ends, pieces - pieces[0], commands, begin, end, length, data)
-        if not done:
-            return None
-        edits, size = printer.edits, printer.size
-        return commands[:done], Splices(begin[:edits], end[:edits], length[:edits], data[:size].tobytes())
+        room = Room((stop - row) * (len(position) + 1), self._room(pieces, blocks, len(position) * rules().room))
+        commands = np.empty_like(ends)
+        done = self._printer(room, position, frame, decimals).write(blocks, ends, pieces - pieces[0], commands)
+        return (commands[:done], room.splices) if done else None
 
     def _room(self, pieces: Ints, blocks: NDArray[np.int32], words: int) -> int:
         """Upper bound of the bytes of words and lines of some motions; `words`: bytes of the words of a piece."""
