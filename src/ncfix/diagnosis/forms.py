@@ -41,6 +41,8 @@ from ncfix.measure.least_squares import orthonormal, without
 from ncfix.measure.observation import Observation, base_from_workpiece
 from ncfix.values import frozen
 
+EQUAL = 1e-6
+"""Relative difference up to which eigenvalues count as equal."""
 VISIBLE = 0.05
 """Smallest share of a form's squares that set-up and constants cannot absorb, for the form to be visible."""
 SHARE_DIGITS = 9
@@ -204,7 +206,17 @@ def principal_rotation(columns: Array) -> Array:
     if columns.shape[1] == 1:
         return np.ones((1, 1))
     squares, turned = np.linalg.eigh(columns.T @ columns)
-    return turned[:, np.cumsum(squares) > NEGLIGIBLE * squares.sum()]
+    return turned[:, first_kept(squares, int(np.argmax(np.cumsum(squares) > NEGLIGIBLE * squares.sum()))) :]
+
+
+def first_kept(squares: Array, first: int) -> int:
+    """The first of ascending eigenvalues to keep, at most `first`, so that equal ones are kept or dropped together.
+
+    The vectors of equal eigenvalues are any directions of the space that they span: of some of them, rounding decides.
+    """
+    while first > 0 and squares[first - 1] > (1 - EQUAL) * squares[first]:
+        first -= 1
+    return first
 
 
 def _visible_shares(data: ResidualData, basis: Array, groups: Sequence[EffectForm]) -> list[float]:
@@ -293,11 +305,11 @@ def scaled_axes(data: ResidualData, q: Array | None = None) -> Array:
 
 
 def kernel_functions(kernel: Array, most: int = MOST_FUNCTIONS) -> Array:
-    """Basis functions (n, k) with F F' nearly equal to the covariance `kernel` (n, n), at most `most`."""
+    """Basis functions (n, k) with F F' nearly equal to the covariance `kernel` (n, n), about `most` at most."""
     squares, vectors = np.linalg.eigh(kernel)
-    squares, vectors = squares[::-1][:most], vectors[:, ::-1][:, :most]
-    kept = squares > 1e-6 * squares[0]
-    found: Array = vectors[:, kept] * np.sqrt(squares[kept])
+    least = int(np.searchsorted(squares, 1e-6 * squares[-1], side="right"))
+    first = first_kept(squares, max(len(squares) - most, least))
+    found: Array = vectors[:, first:] * np.sqrt(squares[first:])
     return found
 
 
@@ -331,8 +343,8 @@ def combined_form(data: ResidualData, owner: Candidate, parts: Sequence[Array]) 
     scaled = (part / (size * np.sqrt(count)) for part, size in zip(parts, sizes, strict=True) if size > 0)
     whole = side_by_side(scaled)
     squares, vectors = np.linalg.eigh(whole.T @ whole)
-    kept = np.cumsum(squares) > DROPPED * squares.sum()
-    return EffectForm.of(owner, np.zeros((0, int(kept.sum()))), whole @ vectors[:, kept])
+    first = first_kept(squares, int(np.argmax(np.cumsum(squares) > DROPPED * squares.sum())))
+    return EffectForm.of(owner, np.zeros((0, len(squares) - first)), whole @ vectors[:, first:])
 
 
 def _joint_forms(data: ResidualData) -> Iterator[EffectForm | None]:
