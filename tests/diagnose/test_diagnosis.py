@@ -288,7 +288,7 @@ def test_one_side_only_is_said(known: Machine) -> None:
     seen = residual_data([simulate(one, known, Faults(NOISE_UM), 1)], known)
     [message] = remarks(seen, ())
     assert message.code == "NCF653"
-    assert "C, B, X, Z, Y came from one side only" in message.text
+    assert "C, B, X, Z, Y approached from one side only" in message.text
     assert not any("backlash" in each.name for each in catalogue(seen.measured))
 
 
@@ -333,4 +333,4 @@ def test_a_noise_that_repeats_deny_is_said(known: Machine) -> None:
     honest, wrong = seen.with_header("noise_um", "2"), seen.with_header("noise_um", "0.2")
     assert remarks(residual_data([honest], known), ()) == []
     (said,) = remarks(residual_data([wrong], known), ())
-    assert (said.code, said.text[:31]) == ("NCF659", "the files state 0.2 um of noise")
+    assert (said.code, said.text[:33]) == ("NCF659", "the files state a noise of 0.2 um")
