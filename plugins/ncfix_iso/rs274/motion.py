@@ -11,7 +11,6 @@ import math
 from ncfix.control.coordinates import INDEX, LETTERS, N_LETTERS, Vector, X, Y, mask_of, rotated
 from ncfix.control.expressions import Fault, Unknown, nominal
 from ncfix.control.moves import FeedMode, Motion, MotionEnd, MotionKind, Pass, Passing, UnknownAxes
-from ncfix.control.operations import make_up
 from ncfix.control.tcp import led_in_machine
 from ncfix_iso.rs274.control import Block, RS274Control
 from ncfix_iso.rs274.systems import REFERENCES, check_system, is_given, store, stored, words_of
@@ -412,6 +411,8 @@ def high_speed(control: RS274Control, block: Block, code: int) -> None:
     if "P" in block.unknown:
         control.refuse_rest(STORED_AT_RUN_TIME)
     elif kind in STORED_CYCLES:
+        from ncfix.control.operations import make_up
+
         make_up(control, block, STORED.format(kind), control.turning)
 
 
