@@ -13,7 +13,7 @@ import pytest
 
 from conftest import require_core
 from ncfix import core
-from ncfix.writer.bulk import Room
+from ncfix.writer.bulk import EditRoom
 
 TEXT = b"N1 X1.5 Y-2.25 F9\nX3.\n"
 ROOM = 38
@@ -74,13 +74,13 @@ def rules(powers: int = 19, longest: int = 16) -> Any:
     return core.loops("words").NumberRules(10.0 ** np.arange(powers), longest, 9, 1e15, 1e-12, 1.5)
 
 
-def pen(room: Room | None = None, **other: Any) -> Any:
-    return core.loops("words").WordPrinter(rules(), (room or Room(9, 400)).buffer, *tables(**other).values())
+def pen(room: EditRoom | None = None, **other: Any) -> Any:
+    return core.loops("words").WordPrinter(rules(), (room or EditRoom(9, 400)).buffer, *tables(**other).values())
 
 
 def written(ends: Any, pieces: Any, *, rows: Any = (0, 1), room: Any = (9, 400), **other: Any) -> tuple[Any, ...]:
     """How many pieces are written, the text then, and the commands."""
-    into, ends = Room(*room), np.array(ends, dtype=np.float64)
+    into, ends = EditRoom(*room), np.array(ends, dtype=np.float64)
     commands = np.zeros((len(ends), AXES))
     done = pen(into, **other).write(np.array(rows, dtype=np.int32), ends, np.array(pieces), commands)
     edits, text, at, taken = into.splices, b"", 0, 0
@@ -194,7 +194,7 @@ def test_a_number_keeps_its_style(number: bytes, value: float, signed: bool, tex
         "anchors": ints((0, 0), (0, 0)),
         "leads": ints((-1, 0), (-1, 0)),
     }
-    room, commands = Room(5, 99), np.zeros((1, AXES))
+    room, commands = EditRoom(5, 99), np.zeros((1, AXES))
     own = pen(room, **program, signed=signed)
     done = own.write(np.zeros(1, np.int32), np.array([[value, 0.0]]), np.array([0, 1]), commands)
     assert (room.splices.data if done else None) == text
@@ -318,7 +318,7 @@ def centred(other: dict[str, Any], wanted: tuple[float, float] = (2.5, 0.25), **
     }
     assert given.keys() >= arguments.keys()
     given |= arguments
-    room = Room(*given.pop("room"))
+    room = EditRoom(*given.pop("room"))
     words = core.loops("words").CentreWords(*(given.pop(name) for name in ("slots", "heads", "radius", "taken")))
     centre, clear = given.pop("centre"), given.pop("clear")
     pen(room, **other).write_centres(*given.values(), words, centre, clear)

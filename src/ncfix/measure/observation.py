@@ -13,6 +13,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -70,6 +71,13 @@ class Observation(ABC):
         self.q = measurement.positions(machine)
         self.state = measurement.state(machine)
         self.set_names, self.set_index = groups(measurement.sets)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The state without what is computed when it is wanted, and would be most of it."""
+        state = self.__dict__.items()
+        return {
+            name: value for name, value in state if not isinstance(getattr(type(self), name, None), cached_property)
+        }
 
     def doubts(self, machine: Machine) -> Iterator[Message]:
         """Remarks on assumptions about the set-up that matter with the errors of this machine."""

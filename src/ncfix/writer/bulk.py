@@ -36,7 +36,7 @@ CIRCLE_MM = 1e-3
 """Smallest distance of start and end of an arc written in bulk, mm: below it `BlockWriter` decides on a full circle."""
 
 
-class Room:
+class EditRoom:
     """Room for so many edits with so many bytes together, which the core fills in."""
 
     def __init__(self, edits: int, size: int) -> None:
@@ -178,7 +178,7 @@ class Bulk:
         fixed = layouts.fixed[program.template[block][:, None], plane] | self.moves.arc_absolute[rows, None]
         places = np.stack((start, end, centre[each, plane], np.where(fixed, 0.0, start)), axis=1)
         words = core.loops("words").CentreWords(layouts.centre, layouts.centre_heads, layouts.radius, layouts.taken)
-        room = Room(3 * n, 2 * rules().room * n)
+        room = EditRoom(3 * n, 2 * rules().room * n)
         printer = self._printer(room, np.zeros(len(self.moves.axes)), frame, decimals)
         found, clear = np.empty((n, 2)), np.empty(n, dtype=np.uint8)
         printer.write_centres(block, plane, columns, places, words, found, clear)
@@ -202,7 +202,7 @@ class Bulk:
         self.parts[-1] = self.parts[-1].outside(self.program.blocks[self.moves.block[rows]])
         self.added -= int(np.diff(self.first_piece)[rows].sum()) - len(rows)
 
-    def _printer(self, room: Room, position: Array, frame: FrameMap, decimals: Ints) -> Any:
+    def _printer(self, room: EditRoom, position: Array, frame: FrameMap, decimals: Ints) -> Any:
         """What writes words in the core, into `room`, from a command at which the control stands."""
         program, layouts, axes = self.program, self.layouts, len(position)
         return core.loops("words").WordPrinter(
@@ -232,7 +232,7 @@ class Bulk:
         stop = int(self.stop[row])
         pieces = self.first_piece[row : stop + 1]
         ends, blocks = self.pieces.end[pieces[0] : pieces[-1]], self.moves.block[row:stop]
-        room = Room((stop - row) * (len(position) + 1), self._room(pieces, blocks, len(position) * rules().room))
+        room = EditRoom((stop - row) * (len(position) + 1), self._room(pieces, blocks, len(position) * rules().room))
         commands = np.empty_like(ends)
         done = self._printer(room, position, frame, decimals).write(blocks, ends, pieces - pieces[0], commands)
         return (commands[:done], room.splices) if done else None
