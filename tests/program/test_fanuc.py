@@ -137,7 +137,7 @@ def test_a_command_that_is_not_known_is_kept_and_refuses_what_follows() -> None:
     program = read(b"G0X1.\nTOOLCHANGE 5\nG0X2.\nM30\n", dialect="fanuc")
     assert isinstance(program.items_of(1)[0], Opaque)
     found = trace(program, KNOWN, ("X", "Y", "Z"), frozenset())
-    assert reasons(found) == ["", "the command TOOLCHANGE is not known, and may move axes or change coordinates"]
+    assert reasons(found) == ["", "the command TOOLCHANGE is unknown and may move axes or change coordinates"]
 
 
 # -- the decimal point ------------------------------------------------------------------------------------------------
@@ -307,11 +307,11 @@ def test_codes(text: str, expected: list[list[float]]) -> None:
         ("G68.2P4I10.\nG0X1.", "tilted plane (G68.2)"),
         ("G254\nG0X1.", "not known"),
         ("G10L50\nG0X1.", "parameters of the control"),
-        ("G0X0Y0\nG68X0Y0R90.\nG52X5.\nG0X1.Y1.", "what G52 does while coordinates are turned"),
+        ("G0X0Y0\nG68X0Y0R90.\nG52X5.\nG0X1.Y1.", "what G52 does while coordinates are rotated"),
         ("G0X0Y0\nG68X0Y0R90.\nG55\nG0X1.Y1.\nG69\nX1.Y1.", "a shift of the origin in rotated coordinates"),
-        ("G51.1X0\nG92X5.\nG0X1.Y1.", "what G92 does while coordinates are turned"),
-        ("G68.2X0Y0Z0I0J0K30.\nG54.1P1\nG0X1.Y1.", "what G54.1 does while coordinates are turned"),
-        ("G68X0Y0R90.\nG10L2P1X5.\nG0X1.Y1.", "what G10 does while coordinates are turned"),
+        ("G51.1X0\nG92X5.\nG0X1.Y1.", "what G92 does while coordinates are rotated"),
+        ("G68.2X0Y0Z0I0J0K30.\nG54.1P1\nG0X1.Y1.", "what G54.1 does while coordinates are rotated"),
+        ("G68X0Y0R90.\nG10L2P1X5.\nG0X1.Y1.", "what G10 does while coordinates are rotated"),
         ("G10L10P1Z5.\nG0X1.", "sets a tool with other words"),
         ("G54.4P1\nG0X1.", "the workpiece setting error compensation (G54.4)"),
         ("G54.2P2\nG0X1.", "the dynamic offset of the rotary table (G54.2)"),

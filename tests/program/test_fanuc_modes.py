@@ -176,7 +176,7 @@ def test_where_a_program_of_haas_goes_may_be_for_a_pallet_or_the_operator() -> N
     assert ["M46" in reason for reason in pallet] == [False, True, True]
     asked = "G21G0X1.\n#501=0.\nM109P501(GO ON Y/N)\nIF[#501EQ78.]GOTO9\nX2.\nN9X3."
     found = reasons(follow(asked, setup=SETUP, dialect="haas"))
-    assert ["decided at run time" in reason for reason in found] == [False, True, True]
+    assert ["known only at run time" in reason for reason in found] == [False, True, True]
 
 
 def test_m199_of_haas_ends_a_program() -> None:

@@ -309,7 +309,7 @@ def test_high_speed_cycles_whose_data_are_in_variables_move_axes(dialect: str, k
     else:
         assert [each[:32] for each in found] == ["", "high-speed cycle machining (G5 P", "", ""]
         cut = reasons(follow(f"G21 G0 X1. Y1. Z1.\nG5 {kind}\nG1 X2. F9.", **setup))
-        assert "the control makes up" in cut[-1]
+        assert "the control generates" in cut[-1]
 
 
 @pytest.mark.parametrize("dialect", ["iso", "fanuc", "haas"])
@@ -326,7 +326,7 @@ def test_a_figure_that_is_copied_moves_all_axes() -> None:
     """G72.1 of Fanuc turns what a subprogram makes; in a text that nothing else tells from ISO, too."""
     found = reasons(follow("G21 G0 X1. Y1. Z1.\nG72.1 P9 L3 R30.\nG1 X2. Z2. F9.\nY2.", dialect="iso"))
     assert "turning cycle" in found[1]
-    assert "the axis Y stands after a turning cycle" in found[2]
+    assert "the axis Y after a turning cycle" in found[2]
 
 
 def test_the_first_work_offset_is_in_force_at_the_start() -> None:

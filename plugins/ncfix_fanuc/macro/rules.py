@@ -166,7 +166,7 @@ HAAS_MIRRORS, HAAS_CYLINDER = (1000, coordinates.HAAS_MIRROR), 1070
 
 HAAS_JUMPS = {
     960: "which blocks are executed after M96 depends on an input of the machine",
-    460: "which blocks are executed after M46 is for the pallet in the machine",
+    460: "which blocks are executed after M46 depends on the pallet in the machine",
 }
 HAAS_END, HAAS_QUESTION = 1990, 1090
 """M199, which ends a program, or returns from it while pallets are changed, and M109, which asks the operator."""

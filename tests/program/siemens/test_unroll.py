@@ -34,7 +34,7 @@ def test_assignments(text: str, lines: list[str]) -> None:
 
 
 def test_what_is_known_at_run_time_only_and_counts_on_others() -> None:
-    with pytest.raises(RefusedError, match="the value of R8 is known only at run time"):
+    with pytest.raises(RefusedError, match="the value of R is known only at run time"):
         flat("FOR R1=1 TO 2\nR8=$AA_IW[X]+R1\nENDFOR")
 
 
