@@ -47,7 +47,7 @@ def test_every_name_without_a_zero_size_is_accepted_in_a_machine_file(ncfix, exa
                 f'{head}\n[[effect]]\nname = "{name}"\ncoefficients = [1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6]\n'
             )
             done = ncfix("machine", "check", path)
-            assert (done.code, f"7 coefficients, {name} has" in done.err + done.out.decode()) == (3, True), done.err
+            assert (done.code, f"7 coefficients, but {name} has" in done.err + done.out.decode()) == (3, True), done.err
 
 
 def test_bases_have_their_keys(ncfix):

@@ -19,7 +19,7 @@ FIX = "fix part.ngc -m machine.toml -o - --assume-zero --no-figures"
     [
         ("machine check - <&-", 3, "<stdin>: NCF002: cannot be read: it is closed"),
         ("fix - -m machine.toml -o - <&-", 3, "<stdin>: NCF002: cannot be read: it is closed"),
-        ("check - - -m machine.toml --assume-zero <part.ngc", 2, "NCF022: standard input is to be two inputs"),
+        ("check - - -m machine.toml --assume-zero <part.ngc", 2, "NCF022: standard input is given for two inputs"),
         ("effects >&-", 2, "<stdout>: NCF007: is closed"),
         (f"{FIX} >&-", 2, "<stdout>: NCF007: is closed"),
         pytest.param("effects >/dev/full", 2, "NCF007: cannot be written: No space left", marks=FULL),

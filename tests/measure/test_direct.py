@@ -77,6 +77,6 @@ def test_an_angle_that_is_far_off_is_named_with_its_unit() -> None:
     values[57] += 3e-4
     result = calibrate([seen.with_columns({"value": values})], MACHINE, "EAX")
     (said,) = (message.text for message in result.remarks if message.code == "NCF633")
-    name, _, size, unit = said.split()[:4]
+    name, _, _, size, unit = said.split()[:5]
     assert (name, unit) == ("EAX", "urad")
     assert float(size) == pytest.approx(300, abs=15)

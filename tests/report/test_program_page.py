@@ -250,7 +250,7 @@ def long_page(parts: int, count: int) -> ProgramPage:
 def test_a_page_says_what_it_leaves_out_and_stays_small(tmp_path: Path, chromium: Any) -> None:
     content = long_page(3, 400_000).html()
     assert len(content) < 8e6
-    (said,) = re.findall(rb"Drawn are (\d+) of 1200000 places.*by at most ([\d.]+) mm", content, re.DOTALL)
+    (said,) = re.findall(rb"(\d+) of 1200000 examined points.*by at most ([\d.]+) mm", content, re.DOTALL)
     assert int(said[0]) <= DRAWN
     path = tmp_path / "big.html"
     path.write_bytes(content)

@@ -35,7 +35,7 @@ def turning() -> Machine:
 def test_a_grid_in_space_cannot_follow_c() -> None:
     found = least_of_functions(turning(), ranges_of(turning()), 0.0, "XYZ", ways=True)
     assert found.value == pytest.approx(0.01, rel=1e-9)  # from +10 to -10 um where X, Y and Z stand
-    assert "can leave less than 10.00 um" in found.sentence
+    assert "at least 10.00 um remain" in found.sentence
 
 
 def test_the_grid_in_the_middle_comes_near_to_it() -> None:
