@@ -16,7 +16,7 @@ SILLY = [
     (["fix", "", "-m", "machine.toml", "-o", "a"], 3, "'': NCF002: cannot be read: No such file"),
     (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--setup", ""], 3, "'': NCF002"),
     (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--tool-table", ""], 3, "'': NCF002"),
-    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--tool", "-5=1"], 2, "'-5' is neither a tool number nor a tool name"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--tool", "-5=1"], 2, "'-5' is neither a tool number"),
     (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--tool", "5=1_0"], 2, "'1_0' is not a number"),
     (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--offset", "G54=a"], 2, "'' is not a number"),
     (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--offset", "G54=1;2"], 2, "'1;2' is not a number"),
