@@ -77,7 +77,7 @@ class JointTable:
         """The name of its file."""
         return f"joint_{self.number}_{self.axis}.comp"
 
-    def does_as(self, other: JointTable) -> bool:
+    def has_same_table(self, other: JointTable) -> bool:
         """Whether another table holds the same numbers."""
         columns = ((each.nodes, each.forward, each.reverse) for each in (self, other))
         return all(np.array_equal(*pair) for pair in zip(*columns, strict=True))
@@ -175,7 +175,7 @@ def _sections(ini: Remarks) -> dict[str, Entries]:
         elif entry := ENTRY.fullmatch(row):
             key = entry[1].upper()
             if key in ONCE and key in entries:
-                ini.refuse(number, f"{key} is there twice: LinuxCNC takes the first", "one line for each")
+                ini.refuse(number, f"{key} appears twice: LinuxCNC takes the first", "one line for each")
             entries[key] = (number, entry[2])
         elif row.strip() and not row.lstrip().startswith(("#", ";")):
             ini.refuse(number, "neither a section, nor NAME = VALUE, nor a comment")
@@ -351,7 +351,7 @@ class LinuxCnc(Control):
         for joint in joints:
             moving.setdefault(joint.axis, []).append(joint)
         for axis, together in moving.items():
-            if not all(together[0].does_as(other) for other in together[1:]):
+            if not all(together[0].has_same_table(other) for other in together[1:]):
                 numbers = " and ".join(str(joint.number) for joint in together)
                 text = f"joints {numbers} move {axis} together: two tables for one axis are not run"
                 hint = "leave one of the two COMP_FILE lines to look at one side alone"

@@ -407,8 +407,8 @@ def test_the_forms_of_an_interferometers_file(text: str):
         ("Targets:", "Target:", "no line `Targets:`"),
         ("Axis: X", "Axis: X\nUnits: inches", "targets are read as mm"),
         ("USER-TEXT::", "Target units: in\nUSER-TEXT::", "targets are read as mm"),
-        ("Axis: X", "Axis: X\nAxis: Y", "`Axis:` is there twice"),
-        ("ENVIRONMENT::", "DEVIATIONS::\nRun Target Data:\n1 1 0.1\n", "`Run Target Data:` is there twice"),
+        ("Axis: X", "Axis: X\nAxis: Y", "`Axis:` appears twice"),
+        ("ENVIRONMENT::", "DEVIATIONS::\nRun Target Data:\n1 1 0.1\n", "`Run Target Data:` appears twice"),
     ],
 )
 def test_interferometers_files_that_cannot_be_taken_for_positioning(old: str, new: str, said: str):

@@ -148,8 +148,8 @@ BROKEN_INI = {
     "no such file": (INI.replace(b"x.comp", b"y.comp"), "y.comp is missing"),
     "no such joint": (INI.replace(b"JOINT_0", b"JOINT_7"), "no axis of COORDINATES"),
     "no units": (INI.replace(b"LINEAR_UNITS = mm\n", b""), "LINEAR_UNITS"),
-    "two types": (INI + b"COMP_FILE_TYPE = 0\n", "COMP_FILE_TYPE is there twice: LinuxCNC takes the first"),
-    "a joint twice": (INI + b"[JOINT_0]\nCOMP_FILE = y.comp\n", "COMP_FILE is there twice"),
+    "two types": (INI + b"COMP_FILE_TYPE = 0\n", "COMP_FILE_TYPE appears twice: LinuxCNC takes the first"),
+    "a joint twice": (INI + b"[JOINT_0]\nCOMP_FILE = y.comp\n", "COMP_FILE appears twice"),
     "the section of an axis": (INI.replace(b"JOINT_0", b"AXIS_X"), "reads it under [JOINT_n]"),
     "no assignment": (INI + b"COMP FILE x\n", "nor NAME = VALUE"),
 }

@@ -236,7 +236,7 @@ def etalon(text: str, path: str) -> Measurement:
             section = match[1]
             if section in seen:
                 hint = "give each measurement as a file of its own"
-                raise ConfigError.of("NCF618", f"[{section}] is there twice", Place(path, number, 1, line), hint)
+                raise ConfigError.of("NCF618", f"[{section}] appears twice", Place(path, number, 1, line), hint)
             seen.add(section)
         elif section and re.match(r"VALUE\s*=", plain):
             rows.remarks.append(Message("NCF618", _located(f"E{section}", section), Place(path, number, 1, line)))
@@ -350,7 +350,7 @@ def _rtl(text: str, path: str) -> Rtl:
         elif match := KEY.match(plain):
             key = match[1].lower()
             if key in ONCE and key in found.texts:
-                raise found.odd(f"`{match[1]}:` is there twice", number, "one measurement in a file")
+                raise found.odd(f"`{match[1]}:` appears twice", number, "one measurement in a file")
             found.texts.setdefault(key, (match[2].strip(), number))
             plain = match[2]
         if key == "targets":
